@@ -1,0 +1,2 @@
+//! The command `egomotion`.
+fn main() {}

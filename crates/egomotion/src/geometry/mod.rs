@@ -1,0 +1,13 @@
+//! The geometry everything else stands on: the rig, rigid motion, perspective flow, dense fields
+//! and Gaussians. Imports nothing from the rest of the crate.
+
+pub mod gaussian;
+pub mod grid;
+pub mod perspective;
+pub mod rig;
+pub mod twist;
+
+pub use gaussian::Gaussian;
+pub use grid::{Field, Grid, Image};
+pub use rig::{RigError, StereoRig};
+pub use twist::{RigidMotion, Twist};
