@@ -4,4 +4,8 @@
 //! [`geometry`].
 #![deny(missing_docs)]
 
+pub mod constrain;
+pub mod estimate;
 pub mod geometry;
+pub mod motion;
+pub mod observe;

@@ -196,7 +196,7 @@ mod tests {
     fn twists() -> Vec<Twist> {
         let axis = Vector3::new(0.3, -0.5, 0.8).normalize();
         let t = Vector3::new(0.4, -1.0, 2.0);
-        [0.0, 1e-12, 1e-9, 1e-5, 0.0999, 0.1001, 1.0, 3.0, 3.14159, std::f64::consts::PI - 1e-9]
+        [0.0, 1e-12, 1e-9, 1e-5, 0.0999, 0.1001, 1.0, 3.0, 3.1, std::f64::consts::PI - 1e-9]
             .map(|theta| Twist { t, omega: axis * theta })
             .to_vec()
     }

@@ -1,0 +1,276 @@
+//! The discrete motion P′ = R P + T from point pairs, equation (22): unconstrained, and with R a rotation.
+
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+use super::lmeds::{LmedsOptions, robust_scale, trials};
+use super::m_estimator::StudentT;
+use super::{Estimate, MotionEstimate, Unsolvable, blocks, median};
+use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
+use crate::observe::StereoTrack;
+
+/// One point before and after the motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PointPair {
+    /// P at t, in metres, left camera.
+    pub before: Vector3<f64>,
+    /// P′ at t′.
+    pub after: Vector3<f64>,
+    /// Mean variance of a component of P′ − (R P + T), in m².
+    pub variance: f64,
+    /// Block of neighbouring pixels.
+    pub block: usize,
+}
+
+impl PointPair {
+    /// The points that a track measures; `None` unless both disparities are positive.
+    pub fn from_track(track: &StereoTrack, rig: &StereoRig, block: usize) -> Option<Self> {
+        let variance = |end: &Gaussian<3>| {
+            let j = rig.point_jacobian(&end.mean);
+            (j * end.cov * j.transpose()).trace() / 3.0
+        };
+        Some(Self {
+            before: rig.point(&track.before.mean)?,
+            after: rig.point(&track.after.mean)?,
+            variance: variance(&track.before) + variance(&track.after),
+            block,
+        })
+    }
+}
+
+/// Which matrices R are allowed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Any 3×3 matrix: the linear regression (22) in 12 unknowns.
+    Affine,
+    /// Rotations only, by SVD.
+    Rigid,
+}
+
+/// P′ = M P + T.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alignment {
+    /// M; a rotation in the rigid form.
+    pub linear: Matrix3<f64>,
+    /// T, in metres.
+    pub translation: Vector3<f64>,
+}
+
+impl Alignment {
+    fn square(&self, pair: &PointPair) -> f64 {
+        (pair.after - self.linear * pair.before - self.translation).norm_squared()
+    }
+
+    /// The rigid motion with the rotation nearest to M.
+    pub fn motion(&self) -> Option<RigidMotion> {
+        let rotation = RigidMotion::nearest_rotation(&self.linear)?;
+        Some(RigidMotion { rotation, translation: self.translation })
+    }
+
+    /// Velocities by the instantaneous form (27), from M as it is.
+    pub fn instantaneous(&self) -> Twist {
+        RigidMotion { rotation: self.linear, translation: self.translation }.instantaneous()
+    }
+}
+
+/// Weighted sums over point pairs, which determine both forms.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Moments {
+    weight: f64,
+    before: Vector3<f64>,
+    after: Vector3<f64>,
+    spread: Matrix3<f64>,
+    cross: Matrix3<f64>,
+}
+
+impl Moments {
+    /// Sums over weighted pairs.
+    pub fn over<'a>(pairs: impl IntoIterator<Item = (&'a PointPair, f64)>) -> Self {
+        let mut sums = Self::default();
+        for (pair, w) in pairs {
+            sums.weight += w;
+            sums.before += w * pair.before;
+            sums.after += w * pair.after;
+            sums.spread += w * pair.before * pair.before.transpose();
+            sums.cross += w * pair.after * pair.before.transpose();
+        }
+        sums
+    }
+
+    fn without(&self, part: &Self) -> Self {
+        Self {
+            weight: self.weight - part.weight,
+            before: self.before - part.before,
+            after: self.after - part.after,
+            spread: self.spread - part.spread,
+            cross: self.cross - part.cross,
+        }
+    }
+
+    /// The best alignment of a form; `None` where the points do not determine it.
+    pub fn align(&self, form: Form) -> Option<Alignment> {
+        if self.weight <= 0.0 {
+            return None;
+        }
+        let (p, q) = (self.before / self.weight, self.after / self.weight);
+        let spread = self.spread / self.weight - p * p.transpose();
+        let cross = self.cross / self.weight - q * p.transpose();
+        // Collinear points leave a rotation undetermined, coplanar ones a matrix.
+        let eigen = spread.symmetric_eigenvalues();
+        let (smallest, largest) = (eigen.min(), eigen.max());
+        let middle = eigen.sum() - smallest - largest;
+        let needed = if form == Form::Affine { smallest } else { middle };
+        if !(largest > 0.0 && needed > 1e-12 * largest) {
+            return None;
+        }
+        let linear = match form {
+            Form::Affine => cross * spread.try_inverse()?,
+            Form::Rigid => RigidMotion::nearest_rotation(&cross)?,
+        };
+        Some(Alignment { linear, translation: q - linear * p })
+    }
+}
+
+/// How an alignment treats outliers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fitting {
+    /// Least squares, all pairs alike, as in the paper.
+    LeastSquares,
+    /// Least median of squares of the distances |P′ − (M P + T)|, then least squares of the inliers.
+    Lmeds(LmedsOptions),
+    /// Student's t in units of each pair's own standard deviation.
+    MEstimator(StudentT),
+}
+
+/// φ by alignment of point pairs, velocities by (25)–(28), covariance by leaving out one block at a time.
+///
+/// # Errors
+/// [`Unsolvable`] with too few pairs, or when they lie in one plane (affine) or on one line.
+pub fn align(pairs: &[PointPair], form: Form, fitting: &Fitting) -> Result<MotionEstimate, Unsolvable> {
+    let subset = if form == Form::Affine { 4 } else { 3 };
+    if pairs.len() < subset {
+        return Err(Unsolvable::FewRows { rows: pairs.len(), needed: subset });
+    }
+    let (weights, scale) = match fitting {
+        Fitting::LeastSquares => (vec![1.0; pairs.len()], None),
+        Fitting::Lmeds(options) => {
+            let (weights, scale) = lmeds_weights(pairs, form, subset, options)?;
+            (weights, Some(scale))
+        }
+        Fitting::MEstimator(kernel) => {
+            let (weights, scale) = student_weights(pairs, form, kernel)?;
+            (weights, Some(scale))
+        }
+    };
+    let whole = Moments::over(pairs.iter().zip(weights.iter().copied()));
+    let alignment = whole.align(form).ok_or(Unsolvable::Unobservable)?;
+    let phi = |a: &Alignment| a.motion().map(|m| m.log().vector());
+    let mean = phi(&alignment).ok_or(Unsolvable::NotFinite)?;
+    let residual = || {
+        let freedom = (3 * pairs.len()).saturating_sub(3 * subset).max(1) as f64;
+        (pairs.iter().map(|pair| alignment.square(pair)).sum::<f64>() / freedom).sqrt()
+    };
+    let cut = 0.1 * weights.iter().copied().fold(0.0, f64::max);
+    Ok(Estimate {
+        theta: Gaussian { mean, cov: leave_one_out(pairs, &weights, form, &whole, &mean) },
+        observed: [true; 6],
+        rows: pairs.len(),
+        inliers: match fitting {
+            Fitting::MEstimator(_) => {
+                pairs.iter().zip(&weights).filter(|(p, w)| **w * p.variance > 0.25).count()
+            }
+            _ => weights.iter().filter(|&&w| w > cut).count(),
+        },
+        residual_scale: scale.unwrap_or_else(residual),
+    })
+}
+
+fn leave_one_out(
+    pairs: &[PointPair],
+    weights: &[f64],
+    form: Form,
+    whole: &Moments,
+    mean: &Vector6<f64>,
+) -> nalgebra::Matrix6<f64> {
+    let count = pairs.iter().map(|pair| pair.block + 1).max().unwrap_or(0);
+    let mut members: Vec<Vec<(&PointPair, f64)>> = vec![Vec::new(); count];
+    for (pair, &weight) in pairs.iter().zip(weights) {
+        members[pair.block].push((pair, weight));
+    }
+    let left_out: Vec<Vector6<f64>> = members
+        .into_iter()
+        .filter(|block| !block.is_empty())
+        .map(|block| {
+            let rest = whole.without(&Moments::over(block)).align(form);
+            rest.and_then(|a| a.motion()).map_or(*mean, |m| m.log().vector())
+        })
+        .collect();
+    blocks::jackknife(&left_out)
+}
+
+fn lmeds_weights(
+    pairs: &[PointPair],
+    form: Form,
+    subset: usize,
+    options: &LmedsOptions,
+) -> Result<(Vec<f64>, f64), Unsolvable> {
+    let count = trials(options.confidence, options.outliers, subset as u32);
+    let mut best: Option<(f64, Alignment)> = None;
+    let mut squares = vec![0.0; pairs.len()];
+    // Subsets of four serve both forms: a rotation uses the first three.
+    if pairs.len() >= 4 {
+        for four in super::lmeds::random_subsets::<4>(pairs.len(), count, options.seed) {
+            let chosen = four[..subset].iter().map(|&i| (&pairs[i], 1.0));
+            let Some(alignment) = Moments::over(chosen).align(form) else { continue };
+            squares.iter_mut().zip(pairs).for_each(|(s, pair)| *s = alignment.square(pair));
+            let middle = median(&mut squares);
+            if best.is_none_or(|(m, _)| middle < m) {
+                best = Some((middle, alignment));
+            }
+        }
+    }
+    let (middle, mut alignment) = best.ok_or(Unsolvable::Unobservable)?;
+    let scale = robust_scale(middle, pairs.len(), subset);
+    let limit = (options.cut * scale).powi(2).max(1e-24);
+    let mut weights = Vec::new();
+    for _ in 0..options.reweights.max(1) {
+        let next: Vec<f64> =
+            pairs.iter().map(|pair| f64::from(u8::from(alignment.square(pair) <= limit))).collect();
+        if next == weights {
+            break;
+        }
+        weights = next;
+        alignment = Moments::over(pairs.iter().zip(weights.iter().copied()))
+            .align(form)
+            .ok_or(Unsolvable::Unobservable)?;
+    }
+    Ok((weights, scale))
+}
+
+fn student_weights(
+    pairs: &[PointPair],
+    form: Form,
+    kernel: &StudentT,
+) -> Result<(Vec<f64>, f64), Unsolvable> {
+    let mut weights: Vec<f64> = pairs.iter().map(|pair| pair.variance.recip()).collect();
+    let mut squares: Vec<f64> = Vec::with_capacity(pairs.len());
+    // A robust first scale; 2.366 is the median of χ²₃.
+    let mut scale2 = None;
+    for _ in 0..kernel.iterations {
+        let alignment = Moments::over(pairs.iter().zip(weights.iter().copied()))
+            .align(form)
+            .ok_or(Unsolvable::Unobservable)?;
+        squares.clear();
+        squares.extend(pairs.iter().map(|pair| alignment.square(pair) / pair.variance));
+        let s2 = scale2.unwrap_or_else(|| median(&mut squares.clone()) / 2.366).max(f64::MIN_POSITIVE);
+        let robust: Vec<f64> = squares.iter().map(|q| kernel.weight(q / s2, 3.0)).collect();
+        let sum: f64 = robust.iter().zip(&squares).map(|(w, q)| w * q).sum();
+        scale2 = Some((sum / (3 * pairs.len()) as f64).max(f64::MIN_POSITIVE));
+        let next: Vec<f64> = robust.iter().zip(pairs).map(|(w, pair)| w / pair.variance).collect();
+        let settled = next.iter().zip(&weights).all(|(a, b)| (a - b).abs() <= kernel.tolerance * a.max(*b));
+        weights = next;
+        if settled {
+            break;
+        }
+    }
+    Ok((weights, scale2.unwrap_or(1.0).sqrt()))
+}

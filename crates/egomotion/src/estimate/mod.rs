@@ -1,0 +1,134 @@
+//! From constraints to φ with its covariance.
+
+pub mod alignment;
+pub mod blocks;
+pub mod least_squares;
+pub mod lmeds;
+pub mod m_estimator;
+pub mod maximum_likelihood;
+pub mod observability;
+pub mod row;
+pub mod two_step;
+
+use nalgebra::{SMatrix, SVector};
+use thiserror::Error;
+
+use crate::geometry::{Gaussian, Twist};
+
+pub use blocks::Blocks;
+pub use observability::Observability;
+pub use row::{NormalEquations, Row};
+
+/// The answer of an estimator of N unknowns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate<const N: usize> {
+    /// θ̂ and its covariance; an unobserved component has value 0 and an infinite variance.
+    pub theta: Gaussian<N>,
+    /// Which components are determined by the data.
+    pub observed: [bool; N],
+    /// Number of rows (or observations) that went in.
+    pub rows: usize,
+    /// Number of rows that the estimator kept as inliers.
+    pub inliers: usize,
+    /// Scale of the residuals: in units of each row's σ where rows are weighted, else in the rows' own unit.
+    pub residual_scale: f64,
+}
+
+/// φ of the left camera with its covariance, order (tX, tY, tZ, ΩX, ΩY, ΩZ), metres and radians per interval.
+pub type MotionEstimate = Estimate<6>;
+
+impl<const N: usize> Estimate<N> {
+    /// Whether every component is determined.
+    pub fn is_complete(&self) -> bool {
+        self.observed.iter().all(|&o| o)
+    }
+}
+
+impl MotionEstimate {
+    /// φ̂.
+    pub fn phi(&self) -> Twist {
+        Twist::from_vector(&self.theta.mean)
+    }
+
+    /// The same motion and covariance seen by a parallel camera centred at `centre`, equation (4).
+    pub fn seen_from(&self, centre: &nalgebra::Vector3<f64>) -> Self {
+        let matrix = Twist::seen_from_matrix(centre);
+        Self { theta: self.theta.propagate(matrix * self.theta.mean, &matrix), ..*self }
+    }
+}
+
+/// Why a system of equations has no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum Unsolvable {
+    /// Fewer equations than unknowns.
+    #[error("{rows} equations for {needed} unknowns")]
+    FewRows {
+        /// Equations at hand.
+        rows: usize,
+        /// Equations needed.
+        needed: usize,
+    },
+    /// No direction of motion is determined.
+    #[error("no direction of motion is observable")]
+    Unobservable,
+    /// A number overflowed or was not a number.
+    #[error("the equations contain numbers that are not finite")]
+    NotFinite,
+    /// The iteration did not settle.
+    #[error("the estimator did not converge")]
+    NotConverged,
+}
+
+/// The median; of an even count the mean of the two middle values. NaN for no values. Reorders `values`.
+pub fn median(values: &mut [f64]) -> f64 {
+    let n = values.len();
+    if n == 0 {
+        return f64::NAN;
+    }
+    let (below, &mut upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
+    if n % 2 == 1 {
+        upper
+    } else {
+        let lower = below.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        0.5 * (lower + upper)
+    }
+}
+
+/// What a linear estimator found: θ̂, the weight it gave each row, and how well θ̂ is determined.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit<const N: usize> {
+    /// θ̂.
+    pub theta: SVector<f64, N>,
+    /// The weight of each row in the final normal equations; 0 for a rejected one.
+    pub weights: Vec<f64>,
+    /// Eigen-analysis of the final normal equations.
+    pub observability: Observability,
+    /// Derivative of the total score by θ where it differs from the weighted information.
+    pub bread: Option<SMatrix<f64, N, N>>,
+    /// Number of rows kept as inliers.
+    pub inliers: usize,
+    /// Scale of the residuals, as in [`Estimate::residual_scale`].
+    pub residual_scale: f64,
+}
+
+impl<const N: usize> Fit<N> {
+    /// The estimate with its block-wise covariance; `rows` are those that were fitted.
+    pub fn estimate(&self, rows: &[Row<N>]) -> Estimate<N> {
+        let count = rows.iter().map(|row| row.block + 1).max().unwrap_or(0);
+        let mut scores = vec![blocks::BlockScore::<N>::default(); count];
+        for (row, &weight) in rows.iter().zip(&self.weights) {
+            let block = &mut scores[row.block];
+            block.information += weight * row.a * row.a.transpose();
+            block.score += weight * row.residual(&self.theta) * row.a;
+        }
+        let inverse = self.bread.and_then(|bread| bread.try_inverse());
+        let cov = blocks::covariance(&scores, inverse.as_ref(), &self.observability);
+        Estimate {
+            theta: Gaussian { mean: self.theta, cov },
+            observed: self.observability.observed(),
+            rows: rows.len(),
+            inliers: self.inliers,
+            residual_scale: self.residual_scale,
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Which directions of motion a system of equations determines at all.
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+
+use super::Unsolvable;
+
+/// Eigenvalues of the scaled information below this share of the largest count as zero.
+///
+/// The scaled matrix has a unit diagonal, so the share does not depend on units; double precision
+/// sums of 10⁵ rows are good to about 10⁻¹².
+const RANK_TOLERANCE: f64 = 1e-10;
+
+/// Components with more of themselves than this (squared) in an undetermined direction are unobservable.
+const NULL_SHARE: f64 = 1e-6;
+
+/// The eigen-analysis of a scaled information matrix.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observability {
+    /// Scale of each unknown: the inverse root of the information's diagonal.
+    scale: DVector<f64>,
+    /// Eigenvalues of the scaled information.
+    eigenvalues: DVector<f64>,
+    /// Eigenvectors, one a column.
+    eigenvectors: DMatrix<f64>,
+}
+
+impl Observability {
+    /// Analyse an N×N information matrix (symmetric, positive semi-definite, finite).
+    ///
+    /// # Errors
+    /// [`Unsolvable::NotFinite`] when an entry is NaN or infinite, [`Unsolvable::Unobservable`] when all are zero.
+    pub fn of<const N: usize>(information: &SMatrix<f64, N, N>) -> Result<Self, Unsolvable> {
+        if !information.iter().all(|v| v.is_finite()) {
+            return Err(Unsolvable::NotFinite);
+        }
+        let diagonal = information.diagonal();
+        if diagonal.max() <= 0.0 {
+            return Err(Unsolvable::Unobservable);
+        }
+        let inverse_root = |v: f64| if v > 0.0 { v.sqrt().recip() } else { 0.0 };
+        let scale = DVector::from_iterator(N, diagonal.iter().map(|&v| inverse_root(v)));
+        let scaled = DMatrix::from_fn(N, N, |i, j| information[(i, j)] * scale[i] * scale[j]);
+        let eigen = scaled.symmetric_eigen();
+        Ok(Self { scale, eigenvalues: eigen.eigenvalues, eigenvectors: eigen.eigenvectors })
+    }
+
+    fn determined(&self) -> impl Iterator<Item = usize> + '_ {
+        let floor = RANK_TOLERANCE * self.eigenvalues.max();
+        (0..self.eigenvalues.len()).filter(move |&k| self.eigenvalues[k] > floor)
+    }
+
+    /// Number of independent directions that are determined.
+    pub fn rank(&self) -> usize {
+        self.determined().count()
+    }
+
+    /// Ratio of the largest to the smallest eigenvalue of the scaled information.
+    pub fn condition(&self) -> f64 {
+        self.eigenvalues.max() / self.eigenvalues.min().max(0.0)
+    }
+
+    /// Which of the N unknowns are determined.
+    pub fn observed<const N: usize>(&self) -> [bool; N] {
+        let kept: Vec<usize> = self.determined().collect();
+        std::array::from_fn(|i| {
+            let share: f64 = kept.iter().map(|&k| self.eigenvectors[(i, k)].powi(2)).sum();
+            self.scale[i] > 0.0 && 1.0 - share < NULL_SHARE
+        })
+    }
+
+    /// The whitening matrix W, N × rank: W Wᵀ is the (pseudo-)inverse of the information.
+    pub fn whitening(&self) -> DMatrix<f64> {
+        let kept: Vec<usize> = self.determined().collect();
+        DMatrix::from_fn(self.scale.len(), kept.len(), |i, j| {
+            self.scale[i] * self.eigenvectors[(i, kept[j])] / self.eigenvalues[kept[j]].sqrt()
+        })
+    }
+
+    /// Solve `information` θ = `moment` in the determined directions.
+    ///
+    /// # Errors
+    /// [`Unsolvable::NotFinite`] when the moment is not finite.
+    pub fn solve<const N: usize>(
+        &self,
+        information: &SMatrix<f64, N, N>,
+        moment: &SVector<f64, N>,
+    ) -> Result<SVector<f64, N>, Unsolvable> {
+        let w = self.whitening();
+        let apply = |v: &SVector<f64, N>| -> SVector<f64, N> {
+            let out = &w * (w.transpose() * DVector::from_column_slice(v.as_slice()));
+            SVector::from_column_slice(out.as_slice())
+        };
+        let theta = apply(moment);
+        // One step of refinement wins back the digits that the eigen-decomposition loses.
+        let theta = theta + apply(&(moment - information * theta));
+        if theta.iter().all(|v| v.is_finite()) { Ok(theta) } else { Err(Unsolvable::NotFinite) }
+    }
+}

@@ -1,0 +1,77 @@
+//! Rows of a linear system, and the sums that solve it.
+
+use nalgebra::{SMatrix, SVector};
+
+use super::Unsolvable;
+use crate::constrain::LinearConstraint;
+
+/// One equation a · θ = b ± σ of a linear regression in N unknowns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row<const N: usize> {
+    /// Coefficients a.
+    pub a: SVector<f64, N>,
+    /// Right-hand side b.
+    pub b: f64,
+    /// Standard deviation of b − a · θ.
+    pub sigma: f64,
+    /// Which block of neighbouring pixels the row comes from; see [`super::blocks::Blocks`].
+    pub block: usize,
+}
+
+impl<const N: usize> Row<N> {
+    /// b − a · θ.
+    pub fn residual(&self, theta: &SVector<f64, N>) -> f64 {
+        self.b - self.a.dot(theta)
+    }
+}
+
+impl Row<6> {
+    /// The row of a motion constraint.
+    pub fn from_constraint(constraint: &LinearConstraint, block: usize) -> Self {
+        Self { a: constraint.row(), b: constraint.rate, sigma: constraint.sigma, block }
+    }
+}
+
+/// The sums Σ w a aᵀ, Σ w a b and the number of rows: all that least squares needs, equation (57).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NormalEquations<const N: usize> {
+    /// Σ w a aᵀ.
+    pub information: SMatrix<f64, N, N>,
+    /// Σ w a b.
+    pub moment: SVector<f64, N>,
+    /// Number of rows with a positive weight.
+    pub rows: usize,
+}
+
+impl<const N: usize> Default for NormalEquations<N> {
+    fn default() -> Self {
+        Self { information: SMatrix::zeros(), moment: SVector::zeros(), rows: 0 }
+    }
+}
+
+impl<const N: usize> NormalEquations<N> {
+    /// Sums over weighted rows.
+    pub fn over<'a>(rows: impl IntoIterator<Item = (&'a Row<N>, f64)>) -> Self {
+        let mut sums = Self::default();
+        for (row, weight) in rows {
+            if weight > 0.0 {
+                sums.information += weight * row.a * row.a.transpose();
+                sums.moment += weight * row.b * row.a;
+                sums.rows += 1;
+            }
+        }
+        sums
+    }
+
+    /// The θ that minimises Σ w (b − a · θ)², with the directions no row speaks of left at zero.
+    ///
+    /// # Errors
+    /// [`Unsolvable::FewRows`] with fewer rows than unknowns, [`Unsolvable::NotFinite`] on NaN.
+    pub fn solve(&self) -> Result<(SVector<f64, N>, super::Observability), Unsolvable> {
+        if self.rows < N {
+            return Err(Unsolvable::FewRows { rows: self.rows, needed: N });
+        }
+        let observability = super::Observability::of(&self.information)?;
+        Ok((observability.solve(&self.information, &self.moment)?, observability))
+    }
+}

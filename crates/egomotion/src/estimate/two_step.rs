@@ -1,0 +1,115 @@
+//! The paper's two steps for binocular flow: (14) for tZ, ΩX, ΩY, then (3) for the other three.
+
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+
+use super::blocks::{self, BlockScore};
+use super::{Estimate, Fit, MotionEstimate, Observability, Row, Unsolvable};
+use crate::geometry::Gaussian;
+
+/// Places of (tZ, ΩX, ΩY) in φ: what binocular flow determines.
+const FIRST: [usize; 3] = [2, 3, 4];
+/// Places of (tX, tY, ΩZ) in φ: what is left to image flow.
+const SECOND: [usize; 3] = [0, 1, 5];
+
+fn part(v: &Vector6<f64>, places: [usize; 3]) -> Vector3<f64> {
+    Vector3::from_fn(|i, _| v[places[i]])
+}
+
+/// φ in two steps: `solve` finds (tZ, ΩX, ΩY) from the rows `dv`, then (tX, tY, ΩZ) from the rows `flow`.
+///
+/// The error of the first step is carried into the covariance of the second.
+///
+/// # Errors
+/// Those of `solve`.
+pub fn two_step(
+    dv: &[Row<6>],
+    flow: &[Row<6>],
+    solve: impl Fn(&[Row<3>]) -> Result<Fit<3>, Unsolvable>,
+) -> Result<MotionEstimate, Unsolvable> {
+    let first_rows: Vec<Row<3>> =
+        dv.iter().map(|r| Row { a: part(&r.a, FIRST), b: r.b, sigma: r.sigma, block: r.block }).collect();
+    let first = solve(&first_rows)?;
+    let second_rows: Vec<Row<3>> = flow
+        .iter()
+        .map(|r| Row {
+            a: part(&r.a, SECOND),
+            b: r.b - part(&r.a, FIRST).dot(&first.theta),
+            sigma: r.sigma,
+            block: r.block,
+        })
+        .collect();
+    let second = solve(&second_rows)?;
+
+    let mut system = StackedSystem::new(dv.iter().chain(flow).map(|r| r.block + 1).max().unwrap_or(0));
+    system.add(&first_rows, &first, FIRST);
+    system.add(&second_rows, &second, SECOND);
+    system.couple(flow, &second);
+    let (cov, observed) = system.covariance()?;
+    let mut mean = Vector6::zeros();
+    for i in 0..3 {
+        mean[FIRST[i]] = first.theta[i];
+        mean[SECOND[i]] = second.theta[i];
+    }
+    Ok(Estimate {
+        theta: Gaussian { mean, cov },
+        observed,
+        rows: dv.len() + flow.len(),
+        inliers: first.inliers + second.inliers,
+        residual_scale: second.residual_scale,
+    })
+}
+
+/// Both steps as one system of estimating equations, whose derivative is block triangular.
+struct StackedSystem {
+    scores: Vec<BlockScore<6>>,
+    bread: Matrix6<f64>,
+}
+
+impl StackedSystem {
+    fn new(blocks: usize) -> Self {
+        Self { scores: vec![BlockScore::default(); blocks], bread: Matrix6::zeros() }
+    }
+
+    fn add(&mut self, rows: &[Row<3>], fit: &Fit<3>, places: [usize; 3]) {
+        let mut information = Matrix3::zeros();
+        for (row, &weight) in rows.iter().zip(&fit.weights) {
+            let (outer, score) =
+                (weight * row.a * row.a.transpose(), weight * row.residual(&fit.theta) * row.a);
+            information += outer;
+            let block = &mut self.scores[row.block];
+            for i in 0..3 {
+                block.score[places[i]] += score[i];
+                for j in 0..3 {
+                    block.information[(places[i], places[j])] += outer[(i, j)];
+                }
+            }
+        }
+        let bread = fit.bread.unwrap_or(information);
+        for i in 0..3 {
+            for j in 0..3 {
+                self.bread[(places[i], places[j])] += bread[(i, j)];
+            }
+        }
+    }
+
+    /// How the second step's score changes with the first step's answer.
+    fn couple(&mut self, flow: &[Row<6>], second: &Fit<3>) {
+        let coupling: Matrix3<f64> = flow
+            .iter()
+            .zip(&second.weights)
+            .map(|(row, &weight)| weight * part(&row.a, SECOND) * part(&row.a, FIRST).transpose())
+            .sum();
+        for i in 0..3 {
+            for j in 0..3 {
+                self.bread[(SECOND[i], FIRST[j])] += coupling[(i, j)];
+            }
+        }
+    }
+
+    fn covariance(&self) -> Result<(Matrix6<f64>, [bool; 6]), Unsolvable> {
+        let total: Matrix6<f64> = self.scores.iter().map(|block| block.information).sum();
+        let observability = Observability::of(&total)?;
+        let inverse = self.bread.try_inverse();
+        Ok((blocks::covariance(&self.scores, inverse.as_ref(), &observability), observability.observed()))
+    }
+}
