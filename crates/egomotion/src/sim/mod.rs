@@ -1,0 +1,20 @@
+//! A synthetic world whose every answer is known: textured rooms, rendered for a moving stereo rig.
+//!
+//! [`Scene`] → [`View`] (images and exact truth at one pose) → [`SensorNoise`]; a [`Sequence`] strings the
+//! poses together. The world's frame is that of the cyclopean camera at time 0: X right, Y down, Z forward.
+
+pub mod noise;
+pub mod render;
+pub mod scene;
+pub mod sequences;
+pub mod shape;
+pub mod texture;
+pub mod truth;
+
+pub use noise::SensorNoise;
+pub use render::{StereoImages, View};
+pub use scene::{Hit, Part, Scene};
+pub use sequences::Sequence;
+pub use shape::Shape;
+pub use texture::Texture;
+pub use truth::{MotionTruth, PointTruth, field_of};

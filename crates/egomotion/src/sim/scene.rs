@@ -1,0 +1,206 @@
+//! A scene of plain parts: what a ray sees, and how bright it looks.
+
+use nalgebra::Vector3;
+
+use super::shape::Shape;
+use super::texture::Texture;
+
+/// Number of surface ids that a part takes: a box has six faces.
+const FACES: u16 = 6;
+/// Standard deviation of a surface's grey level, as a share of its mean.
+const CONTRAST: f64 = 0.38;
+/// Where the texture saturates, in its standard deviations: keeps every grey level above zero.
+const SATURATION: f64 = 2.4;
+/// Light that reaches every surface, whatever its direction, as a share of full light.
+const AMBIENT: f64 = 0.5;
+
+/// One part of a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    /// Its shape, in the world's frame.
+    pub shape: Shape,
+    /// Mean grey level in full light, 0 … 130 keeps the brightest spots within 8 bits.
+    pub grey: f64,
+}
+
+/// What a ray sees.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// Ray parameter: the depth Z in metres where the direction has Z = 1 in the camera's frame.
+    pub s: f64,
+    /// The point, in metres, world frame.
+    pub point: Vector3<f64>,
+    /// Unit normal of the surface, towards the ray's origin.
+    pub normal: Vector3<f64>,
+    /// Surface id: unique to a part, and to a face where the part is a box.
+    pub surface: u16,
+}
+
+/// Textured parts under one lamp. Everything that decides a point's brightness is fixed to the world,
+/// so that brightness is constant between cameras and between frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    parts: Vec<Part>,
+    texture: Texture,
+    lamp_m: Vector3<f64>,
+}
+
+impl Scene {
+    /// A scene of at most 10 000 parts (further ones are dropped), a texture from `seed`, a lamp at `lamp_m`.
+    pub fn new(mut parts: Vec<Part>, lamp_m: Vector3<f64>, seed: u64) -> Self {
+        parts.truncate(10_000);
+        Self { parts, texture: Texture::new(seed), lamp_m }
+    }
+
+    /// The room of section 7.1: ground, front wall, two side walls, a sphere and a turned box.
+    pub fn paper_room() -> Self {
+        let parts = [
+            (Shape::plane([0.0, -1.0, 0.0], -0.9), 100.0),
+            (Shape::plane([0.0, 0.0, -1.0], -6.0), 126.0),
+            (Shape::plane([1.0, 0.0, 0.0], -1.7), 116.0),
+            (Shape::plane([-1.0, 0.0, 0.0], -1.7), 112.0),
+            (Shape::sphere([-0.35, 0.30, 2.1], 0.40), 130.0),
+            (Shape::turned_box([0.55, 0.55, 3.2], [0.35, 0.35, 0.30], 30.0), 80.0),
+        ];
+        Self::new(
+            parts.map(|(shape, grey)| Part { shape, grey }).to_vec(),
+            Vector3::new(-0.6, -2.0, 0.8),
+            2003,
+        )
+    }
+
+    /// A furnished room, 5 m × 8.5 m, for the built-in demonstration: an obstacle ahead, others around it.
+    pub fn demo_room() -> Self {
+        let parts = [
+            // Floor, ceiling, front, back, left and right wall.
+            (Shape::plane([0.0, -1.0, 0.0], -0.7), 92.0),
+            (Shape::plane([0.0, 1.0, 0.0], -1.7), 130.0),
+            (Shape::plane([0.0, 0.0, -1.0], -6.5), 128.0),
+            (Shape::plane([0.0, 0.0, 1.0], -2.0), 110.0),
+            (Shape::plane([1.0, 0.0, 0.0], -2.4), 122.0),
+            (Shape::plane([-1.0, 0.0, 0.0], -2.6), 112.0),
+            // The obstacle, with a ball on it.
+            (Shape::turned_box([0.10, 0.35, 3.05], [0.38, 0.35, 0.28], 14.0), 66.0),
+            (Shape::sphere([0.16, -0.17, 3.02], 0.17), 130.0),
+            // Left: a ball, a low crate, a pillar, a cupboard.
+            (Shape::sphere([-1.15, 0.33, 3.7], 0.37), 104.0),
+            (Shape::turned_box([-0.98, 0.54, 2.5], [0.26, 0.16, 0.20], 38.0), 124.0),
+            (Shape::turned_box([-1.30, -0.50, 5.2], [0.20, 1.20, 0.20], 20.0), 84.0),
+            (Shape::turned_box([-2.15, -0.05, 3.6], [0.25, 0.75, 0.55], 0.0), 72.0),
+            // Right: two crates on each other, a shelf, a lamp's globe.
+            (Shape::turned_box([1.35, 0.30, 4.1], [0.42, 0.40, 0.40], -25.0), 110.0),
+            (Shape::turned_box([1.30, -0.34, 4.15], [0.26, 0.24, 0.26], 18.0), 62.0),
+            (Shape::turned_box([2.30, -0.10, 2.9], [0.30, 0.80, 0.50], 0.0), 128.0),
+            (Shape::sphere([0.75, -1.05, 4.6], 0.22), 130.0),
+            // Behind: a table, and pictures on the wall.
+            (Shape::turned_box([0.15, 0.10, 5.7], [0.75, 0.60, 0.35], -6.0), 96.0),
+            (Shape::quad([-0.35, -0.85, 6.48], [0.50, 0.0, 0.0], [0.0, 0.35, 0.0]), 64.0),
+            (Shape::quad([1.75, -0.70, 6.48], [0.35, 0.0, 0.0], [0.0, 0.48, 0.0]), 84.0),
+        ];
+        Self::new(parts.map(|(shape, grey)| Part { shape, grey }).to_vec(), Vector3::new(0.3, -1.5, 1.6), 42)
+    }
+
+    /// The parts, in the order of their surface ids.
+    pub fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// First surface on the ray origin + s · direction, s > 0; `None` if it meets nothing.
+    pub fn cast(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Hit> {
+        let mut nearest: Option<(u16, super::shape::Meeting)> = None;
+        for (part, id) in self.parts.iter().zip(0_u16..) {
+            if let Some(m) = part.shape.meet(origin, direction)
+                && nearest.is_none_or(|(_, best)| m.s < best.s)
+            {
+                nearest = Some((id, m));
+            }
+        }
+        nearest.map(|(id, m)| Hit {
+            s: m.s,
+            point: origin + m.s * direction,
+            normal: m.normal,
+            surface: id * FACES + m.face,
+        })
+    }
+
+    /// Whether nothing stands between `origin` and a point on a surface.
+    pub fn sees(&self, origin: &Vector3<f64>, point: &Vector3<f64>) -> bool {
+        let direction = point - origin;
+        let blocks = |part: &Part| part.shape.meet(origin, &direction).is_some_and(|m| m.s < 1.0 - 1e-6);
+        !self.parts.iter().any(blocks)
+    }
+
+    /// Distance from a point to the nearest surface, in metres; negative inside a solid or behind a wall.
+    pub fn clearance_m(&self, p: &Vector3<f64>) -> f64 {
+        self.parts.iter().map(|part| part.shape.clearance_m(p)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Grey level, 0 … 255, of a hit seen by a pixel whose steps move the point by `du`, `dv` (metres).
+    pub fn grey(&self, hit: &Hit, du: &Vector3<f64>, dv: &Vector3<f64>) -> f64 {
+        let id = hit.surface / FACES;
+        let Some(part) = self.parts.get(usize::from(id)) else { return 0.0 };
+        // Each part is cut from another place of the same material.
+        let place = f64::from(id);
+        let cut =
+            Vector3::new((place * 0.618).fract(), (place * 0.755).fract(), (place * 0.570).fract()) * 4.0;
+        let n = self.texture.value(&(hit.point + cut), du, dv);
+        let n = n / (1.0 + n * n / (SATURATION * SATURATION)).sqrt();
+        (part.grey * self.light(id, hit) * (1.0 + CONTRAST * n)).clamp(0.0, 255.0)
+    }
+
+    /// Share of full light at a hit: ambient light, the lamp, and the soft shade of the parts nearby.
+    fn light(&self, id: u16, hit: &Hit) -> f64 {
+        let to_lamp = self.lamp_m - hit.point;
+        let range_squared = to_lamp.norm_squared();
+        let slant = (hit.normal.dot(&to_lamp) / range_squared.sqrt()).max(0.0);
+        let lamp = (1.0 - AMBIENT) * (0.25 + 0.75 * slant) / (1.0 + 0.02 * range_squared);
+        let open = |(part, other): (&Part, u16)| match part.shape.shade_ball().filter(|_| other != id) {
+            // Share of the half space that a ball hides from the surface.
+            Some((centre, radius)) => {
+                let to = centre - hit.point;
+                let d2 = to.norm_squared().max(radius * radius);
+                1.0 - 0.75 * (hit.normal.dot(&to) / d2.sqrt()).clamp(0.0, 1.0) * radius * radius / d2
+            }
+            None => 1.0,
+        };
+        (AMBIENT + lamp) * self.parts.iter().zip(0..).map(open).product::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paper_room_against_closed_forms() {
+        let scene = Scene::paper_room();
+        let cast = |x: f64, y: f64| scene.cast(&Vector3::zeros(), &Vector3::new(x, y, 1.0)).unwrap();
+        assert!((cast(0.0, -0.2).s - 6.0).abs() < 1e-12);
+        assert!((cast(0.0, 0.45).s - 2.0).abs() < 1e-12);
+        assert!((cast(-0.5, -0.1).s - 3.4).abs() < 1e-12);
+        assert!((cast(0.5, -0.1).s - 3.4).abs() < 1e-12);
+        // Through the sphere's centre: its front lies one radius nearer.
+        let centre = Vector3::new(-0.35, 0.30, 2.1);
+        let hit = scene.cast(&Vector3::zeros(), &centre).unwrap();
+        assert!((hit.s - (1.0 - 0.4 / centre.norm())).abs() < 1e-12);
+        // Every ray of the image meets something, and boxes have faces of their own.
+        let mut seen = std::collections::BTreeSet::new();
+        for i in -38..=38 {
+            for j in -28..=28 {
+                seen.insert(cast(f64::from(i) / 100.0, f64::from(j) / 100.0).surface);
+            }
+        }
+        let box_faces = seen.iter().filter(|&&id| id / FACES == 5).count();
+        assert_eq!(box_faces, 3, "{seen:?}");
+        assert_eq!(seen.len(), 5 + box_faces, "{seen:?}");
+    }
+
+    #[test]
+    fn sight_is_blocked_by_the_sphere_only() {
+        let scene = Scene::paper_room();
+        let behind = Vector3::new(-0.35, 0.30, 2.1) * (6.0 / 2.1);
+        assert!(!scene.sees(&Vector3::zeros(), &behind));
+        assert!(scene.sees(&Vector3::new(-1.5, 0.0, 0.0), &behind));
+        assert!((scene.clearance_m(&Vector3::zeros()) - 0.9).abs() < 1e-12);
+    }
+}
