@@ -3,6 +3,17 @@
 //! Every reader comes twice: `read` takes a path, `decode` (or `parse`) takes what was read, so
 //! that it also serves streams. No reader panics or allocates without bound on any input, and each
 //! error is one line that names the file, the reason and what to do ([`IoError`]).
+//!
+//! ```no_run
+//! use egomotion_io::{IoError, Source, image};
+//!
+//! let source = Source::open("sequences/06".as_ref())?;
+//! for frame in &source.sequences[0].frames {
+//!     let left = image::read(&frame.left)?;
+//!     println!("{} s: {} x {} pixels", frame.time_s, left.width(), left.height());
+//! }
+//! # Ok::<(), IoError>(())
+//! ```
 #![deny(missing_docs)]
 
 pub mod calibration;

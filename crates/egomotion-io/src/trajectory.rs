@@ -131,7 +131,7 @@ mod tests {
     fn poses() -> Vec<Pose> {
         let at = |k: f64| {
             let twist = Twist { t: Vector3::new(k, -0.3 * k, 1e-9), omega: Vector3::new(0.1, -0.7, 0.2) * k };
-            Pose { time_s: Some(1403636579.763555527 + k), world_from_camera: twist.exp() }
+            Pose { time_s: Some(1_403_636_579.763_555_5 + k), world_from_camera: twist.exp() }
         };
         [0.0, 0.05, 1.0, 3.9].map(at).to_vec()
     }
