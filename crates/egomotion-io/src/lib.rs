@@ -1,2 +1,33 @@
 //! Images, datasets, calibration files, trajectories and maps for `egomotion`.
+//!
+//! Every reader comes twice: `read` takes a path, `decode` (or `parse`) takes what was read, so
+//! that it also serves streams. No reader panics or allocates without bound on any input, and each
+//! error is one line that names the file, the reason and what to do ([`IoError`]).
+//!
+//! ```no_run
+//! use egomotion_io::{IoError, Source, image};
+//!
+//! let source = Source::open("sequences/06".as_ref())?;
+//! for frame in &source.sequences[0].frames {
+//!     let left = image::read(&frame.left)?;
+//!     println!("{} s: {} x {} pixels", frame.time_s, left.width(), left.height());
+//! }
+//! # Ok::<(), IoError>(())
+//! ```
 #![deny(missing_docs)]
+
+pub mod calibration;
+pub mod disparity_png;
+pub mod error;
+pub mod flo;
+pub mod flow_png;
+pub mod image;
+pub mod pfm;
+mod raster;
+pub mod read;
+pub mod source;
+pub mod trajectory;
+pub mod write;
+
+pub use error::IoError;
+pub use source::Source;

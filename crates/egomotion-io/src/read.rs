@@ -1,0 +1,79 @@
+//! Reading whole files with a bound on their size, and numbers out of text.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use crate::IoError;
+
+/// The most pixels that a decoded image or map may have, 2²⁸.
+pub const MAX_PIXELS: usize = 1 << 28;
+
+/// The longest text file that is read, in bytes.
+const MAX_TEXT: u64 = 1 << 28;
+
+/// The longest binary file that is read, in bytes: a map of [`MAX_PIXELS`] with 8 bytes each, and its head.
+const MAX_BYTES: u64 = (MAX_PIXELS as u64) * 8 + (1 << 20);
+
+/// A whole binary file.
+///
+/// # Errors
+/// The file cannot be read, or is longer than any map can be.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, IoError> {
+    bounded(path, MAX_BYTES)
+}
+
+/// A whole text file.
+///
+/// # Errors
+/// The file cannot be read, is longer than 256 MB, or is not UTF-8.
+pub fn text(path: &Path) -> Result<String, IoError> {
+    let not_text =
+        |_| IoError::new(path, "is not a text file", "check that the name belongs to this kind of file");
+    String::from_utf8(bounded(path, MAX_TEXT)?).map_err(not_text)
+}
+
+fn bounded(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
+    let failed = |error: std::io::Error| IoError::system(path, "read", &error);
+    let file = File::open(path).map_err(failed)?;
+    let mut content = Vec::new();
+    // The length that the system tells may be wrong (pipes, devices), so the reading itself is bounded.
+    file.take(limit + 1).read_to_end(&mut content).map_err(failed)?;
+    if content.len() as u64 > limit {
+        return Err(IoError::new(
+            path,
+            format_args!("is longer than {limit} bytes"),
+            "check that this is the right file",
+        ));
+    }
+    Ok(content)
+}
+
+/// The lines of a text that hold something, with their numbers from 1; `#` starts a comment.
+pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let numbered = text.lines().enumerate().map(|(i, line)| (i + 1, line));
+    let bare = numbered.map(|(n, line)| (n, line.split('#').next().unwrap_or_default().trim()));
+    bare.filter(|(_, line)| !line.is_empty())
+}
+
+/// One finite number; the reason if the word is none.
+pub(crate) fn number(word: &str) -> Result<f64, String> {
+    let shown = || word.chars().take(40).collect::<String>();
+    let value: f64 = word.parse().map_err(|_| format!("\"{}\" is not a number", shown()))?;
+    if value.is_finite() { Ok(value) } else { Err(format!("\"{}\" is not a finite number", shown())) }
+}
+
+/// All numbers of a line, separated by white space; the reason if one is not a finite number.
+pub(crate) fn numbers(line: &str) -> Result<Vec<f64>, String> {
+    line.split_whitespace().map(number).collect()
+}
+
+/// Width × height, if it is positive and at most [`MAX_PIXELS`].
+///
+/// # Errors
+/// Names the file and the size.
+pub(crate) fn pixels(path: &Path, width: usize, height: usize) -> Result<usize, IoError> {
+    let count = width.checked_mul(height).filter(|n| (1..=MAX_PIXELS).contains(n));
+    let reason = format_args!("has a size of {width}x{height} pixels").to_string();
+    count.ok_or_else(|| IoError::new(path, reason, format_args!("give an image of 1 to {MAX_PIXELS} pixels")))
+}

@@ -1,0 +1,171 @@
+//! What a SOURCE folder holds: its layout, frames, time stamps, rig and truth.
+
+mod kitti_odometry;
+mod kitti_scenes;
+mod listing;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use egomotion::geometry::{RigidMotion, StereoRig};
+
+use crate::IoError;
+
+/// A recognised recording: one sequence, or a set of independent scenes.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Source {
+    /// The folder, as it was given.
+    pub path: PathBuf,
+    /// The dataset layout.
+    pub layout: Layout,
+    /// Why the folder was taken for this layout.
+    pub reason: String,
+    /// The sequences, never empty; no motion is made between two of them.
+    pub sequences: Vec<Sequence>,
+}
+
+/// A dataset layout.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Layout {
+    /// `image_0`, `image_1` (or `image_2`, `image_3`), `calib.txt`, perhaps `times.txt` and poses.
+    KittiOdometry,
+    /// The stereo and flow set of 2012: grey scenes `image_0`, `image_1`, `calib/`.
+    KittiStereoFlow2012,
+    /// The scene flow set of 2015: colour scenes `image_2`, `image_3`, `calib_cam/`.
+    KittiSceneFlow2015,
+}
+
+/// Consecutive stereo pairs of one rig.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Sequence {
+    /// Name of the sequence or scene: the folder's name, or the scene's number.
+    pub name: String,
+    /// The frames in order of time, never empty.
+    pub frames: Vec<FrameFiles>,
+    /// Where the time stamps come from.
+    pub clock: Clock,
+    /// The rectified rig; `None` where the layout has no calibration.
+    pub rig: Option<StereoRig>,
+    /// True maps, where the layout has them.
+    pub truth_maps: Option<TruthMaps>,
+}
+
+/// The files of one frame.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct FrameFiles {
+    /// Number of the frame in the source, as in the file's name.
+    pub index: usize,
+    /// Left image. The file of a lost frame does not exist: reading it fails, and the frame keeps its place.
+    pub left: PathBuf,
+    /// Right image; `None` if it is missing.
+    pub right: Option<PathBuf>,
+    /// Time stamp, in seconds; strictly increasing.
+    pub time_s: f64,
+    /// True pose of the left camera, `world_from_camera`, if known.
+    pub truth: Option<RigidMotion>,
+}
+
+/// Where time stamps come from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Clock {
+    /// Read from the source.
+    Measured,
+    /// Assumed, because the source has none.
+    Assumed {
+        /// Time from one frame to the next, in seconds.
+        interval_s: f64,
+    },
+}
+
+/// True maps of one frame of a scene; each is `None` where its file is missing.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct TruthMaps {
+    /// The frame that they belong to, by [`FrameFiles::index`].
+    pub index: usize,
+    /// Disparity at this frame, a file for [`crate::disparity_png`].
+    pub disparity: Option<PathBuf>,
+    /// Disparity at the next frame of this frame's pixels, a file for [`crate::disparity_png`].
+    pub next_disparity: Option<PathBuf>,
+    /// Flow to the next frame, a file for [`crate::flow_png`].
+    pub flow: Option<PathBuf>,
+}
+
+/// The layouts for error messages.
+const KNOWN: &str = "known layouts: KITTI odometry (image_0, image_1 or image_2, image_3, and calib.txt), \
+                     KITTI 2012 and 2015 scenes (training/ with image_0, image_1 or image_2, image_3)";
+
+/// Interval of the KITTI cameras, assumed where there are no time stamps, in seconds.
+const KITTI_INTERVAL_S: f64 = 0.1;
+
+impl Source {
+    /// Recognise a folder and list what it holds. Images are not decoded.
+    ///
+    /// # Errors
+    /// The folder is missing, empty or of no known layout; it has no left or no right images; its
+    /// calibration or time stamps are missing or wrong. The error names the file and the line.
+    pub fn open(path: &Path) -> Result<Self, IoError> {
+        Self::open_with(path, None)
+    }
+
+    /// The same with another calibration file in place of the source's own.
+    ///
+    /// # Errors
+    /// As [`Source::open`]; and what is wrong with the calibration file.
+    pub fn open_with(path: &Path, calibration: Option<&Path>) -> Result<Self, IoError> {
+        let folder = path.canonicalize().map_err(|error| IoError::system(path, "open", &error))?;
+        if !folder.is_dir() {
+            return Err(IoError::new(
+                path,
+                "is not a folder",
+                format_args!("give a sequence folder; {KNOWN}"),
+            ));
+        }
+        let recognised = kitti_scenes::recognise(&folder, calibration)?;
+        let recognised = match recognised {
+            Some(found) => Some(found),
+            None => kitti_odometry::recognise(&folder, calibration)?,
+        };
+        let (layout, reason, sequences) = recognised.ok_or_else(|| unknown(path, &folder))?;
+        Ok(Self { path: path.to_owned(), layout, reason, sequences })
+    }
+}
+
+/// What the recognition of a layout gives: layout, reason, sequences.
+type Recognised = (Layout, String, Vec<Sequence>);
+
+fn unknown(path: &Path, folder: &Path) -> IoError {
+    let empty = folder.read_dir().is_ok_and(|mut entries| entries.next().is_none());
+    let reason = if empty { "is an empty folder" } else { "has no layout that is known" };
+    IoError::new(path, reason, KNOWN)
+}
+
+impl Layout {
+    /// Whether it is a set of independent scenes.
+    pub fn is_scene_set(self) -> bool {
+        matches!(self, Self::KittiStereoFlow2012 | Self::KittiSceneFlow2015)
+    }
+}
+
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::KittiOdometry => "KITTI odometry",
+            Self::KittiStereoFlow2012 => "KITTI stereo and flow 2012",
+            Self::KittiSceneFlow2015 => "KITTI scene flow 2015",
+        })
+    }
+}
+
+impl fmt::Display for Clock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Measured => f.write_str("measured"),
+            Self::Assumed { interval_s } => write!(f, "assumed, {interval_s} s a frame"),
+        }
+    }
+}

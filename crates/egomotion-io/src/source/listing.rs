@@ -1,0 +1,74 @@
+//! Numbered image files of two folders, brought together frame by frame.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use super::FrameFiles;
+use crate::{IoError, image};
+
+/// The PNG files of a folder by the key that `key` finds in their stems; empty if there is no such folder.
+pub(super) fn numbered<K: Ord>(
+    folder: &Path,
+    key: impl Fn(&str) -> Option<K>,
+) -> Result<BTreeMap<K, PathBuf>, IoError> {
+    let mut files = BTreeMap::new();
+    if !folder.is_dir() {
+        return Ok(files);
+    }
+    let failed = |error: std::io::Error| IoError::system(folder, "list", &error);
+    for entry in folder.read_dir().map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let stem =
+            path.file_stem().and_then(OsStr::to_str).filter(|_| path.extension() == Some(OsStr::new("png")));
+        if let Some(key) = stem.and_then(&key) {
+            files.insert(key, path);
+        }
+    }
+    Ok(files)
+}
+
+/// A number written in digits alone.
+pub(super) fn digits(text: &str) -> Option<usize> {
+    text.bytes().all(|b| b.is_ascii_digit()).then(|| text.parse().ok())?
+}
+
+/// Frames of the numbers that either folder has, times still 0.
+///
+/// A frame whose left image is lost keeps its place, under the name that the right one has.
+pub(super) fn pairs(
+    left_folder: &Path,
+    left: &BTreeMap<usize, PathBuf>,
+    right: &BTreeMap<usize, PathBuf>,
+) -> Vec<FrameFiles> {
+    let indices: BTreeSet<usize> = left.keys().chain(right.keys()).copied().collect();
+    let frame = |index: usize| {
+        let right = right.get(&index).cloned();
+        let name = right.as_deref().and_then(Path::file_name).unwrap_or_default();
+        let left = left.get(&index).cloned().unwrap_or_else(|| left_folder.join(name));
+        FrameFiles { index, left, right, time_s: 0.0, truth: None }
+    };
+    indices.into_iter().map(frame).collect()
+}
+
+/// Size of the images, from the first one that can be read.
+pub(super) fn image_size(frames: &[FrameFiles]) -> Result<(usize, usize), IoError> {
+    let mut files = frames.iter().flat_map(|f| std::iter::once(&f.left).chain(&f.right));
+    let first = files.next().map(|path| image::size(path));
+    match first {
+        Some(Err(error)) => files.find_map(|path| image::size(path).ok()).ok_or(error),
+        Some(size) => size,
+        None => Err(IoError::new(Path::new(""), "no images", super::KNOWN)),
+    }
+}
+
+/// Both folders must hold images.
+pub(super) fn check_both(left: (&Path, bool), right: (&Path, bool), named: &str) -> Result<(), IoError> {
+    for ((folder, empty), side) in [(left, "left"), (right, "right")] {
+        if empty {
+            let advice = format_args!("give the {side} images as PNG files named {named}").to_string();
+            return Err(IoError::new(folder, format_args!("holds no {side} image"), advice));
+        }
+    }
+    Ok(())
+}
