@@ -1,0 +1,3 @@
+//! From images to measurements, each with its standard deviation.
+
+pub mod disparity;
