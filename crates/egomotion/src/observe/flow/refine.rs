@@ -1,6 +1,6 @@
 //! Lucas–Kanade at full resolution: sub-pixel accuracy, and the covariance.
 
-use super::sampling::cubic;
+use super::sampling::{cubic, cubic_weights};
 use super::smooth::smooth;
 use super::window::{Rows, window_sums};
 use super::{Displacement, FlowField, FlowOptions};
@@ -13,6 +13,16 @@ const MIN_COVERAGE: f32 = 0.6;
 const MAX_LAST_STEP_PX: f32 = 0.5;
 /// No step is longer than this, in pixels: the images are linear over little more.
 const MAX_STEP_PX: f32 = 1.0;
+
+/// Least ratio of a window's weakest gradient energy to what noise alone makes.
+const MIN_TEXTURE: f32 = 2.0;
+
+/// Ratio of the variance that counts (of means over the window, which interpolation does not reduce) to
+/// that of single differences, of which interpolation at the fractions of a displacement averages a part.
+fn hidden_noise((u, v): (f32, f32)) -> f32 {
+    let kept = |d: f32| cubic_weights(d - d.floor()).iter().map(|w| w * w).sum::<f32>();
+    2.0 / (1.0 + kept(u) * kept(v))
+}
 
 /// A pixel's answer: displacement and covariance, NaN where missing.
 #[derive(Clone, Copy)]
@@ -152,14 +162,20 @@ impl Window {
         let noise = 0.5 * variance * GRADIENT_NOISE_GAIN;
         let (uu, uv, vv) = (self.g[0] - noise, self.g[1], self.g[2] - noise);
         let det = uu * vv - uv * uv;
-        let scale = variance / (pixels * det);
+        // G⁻¹ (G + noise) G⁻¹: the noise of the gradients multiplies that of the difference.
+        let scale = variance * hidden_noise((u, v)) / (pixels * det);
+        let [iuu, iuv, ivv] = [vv / det, -uv / det, uu / det];
         let extra = options.sigma_floor_px * options.sigma_floor_px;
-        let cov = [vv * scale + extra, -uv * scale, uu * scale + extra];
+        let cov = [
+            scale * (vv + noise * (iuu * iuu + iuv * iuv) * det) + extra,
+            scale * (-uv + noise * iuv * (iuu + ivv) * det),
+            scale * (uu + noise * (ivv * ivv + iuv * iuv) * det) + extra,
+        ];
+        let least = 0.5 * (uu + vv) - (0.5 * (uu - vv)).hypot(uv);
         let (half, difference) = (0.5 * (cov[0] + cov[2]), 0.5 * (cov[0] - cov[2]));
         let largest = half + difference.hypot(cov[1]);
         let trusted = self.coverage >= MIN_COVERAGE
-            && uu > 0.0
-            && det > 0.0
+            && least > MIN_TEXTURE * noise
             && largest <= options.max_sigma_px * options.max_sigma_px
             && self.residual <= options.max_residual * options.max_residual
             && self.step[0].abs().max(self.step[1].abs()) <= MAX_LAST_STEP_PX;
