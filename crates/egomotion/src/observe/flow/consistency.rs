@@ -1,0 +1,81 @@
+//! Forward and backward flow must undo each other.
+
+use super::sampling::interpolate;
+use super::{Displacement, FlowField};
+
+/// Drop what the `backward` flow (in pixels of its level) does not bring back to within `tolerance`
+/// pixels of where it began, or what leaves the image.
+pub(super) fn reject(flow: &mut FlowField, backward: &Displacement, level: usize, tolerance: f32) {
+    let (width, height) = flow.size();
+    let scale = (1_usize << level) as f32;
+    for y in 0..height {
+        for x in 0..width {
+            let (Some(u), Some(v)) = (flow.u.get(x, y), flow.v.get(x, y)) else { continue };
+            let (tx, ty) = ((x as f32 + u) / scale, (y as f32 + v) / scale);
+            let du = u + scale * interpolate(&backward.u, tx, ty);
+            let dv = v + scale * interpolate(&backward.v, tx, ty);
+            if !(du.hypot(dv) <= tolerance) {
+                flow.u.set(x, y, None);
+                flow.v.set(x, y, None);
+                for plane in [&mut flow.cov_uu, &mut flow.cov_uv, &mut flow.cov_vv] {
+                    plane.set(x, y, f32::NAN);
+                }
+            }
+        }
+    }
+}
+
+/// The same motion seen from the second image: −flow, put where it leads to.
+///
+/// Where two pixels arrive at one, the longer displacement stays: what is nearer moves more, and hides
+/// what is behind.
+pub(super) fn reverse(flow: &FlowField) -> FlowField {
+    let (width, height) = flow.size();
+    let mut back = FlowField::missing(width, height);
+    for y in 0..height {
+        for x in 0..width {
+            let (Some(u), Some(v)) = (flow.u.get(x, y), flow.v.get(x, y)) else { continue };
+            let (tx, ty) = ((x as f32 + u).round(), (y as f32 + v).round());
+            if !(tx >= 0.0 && ty >= 0.0 && tx < width as f32 && ty < height as f32) {
+                continue;
+            }
+            let (tx, ty) = (tx as usize, ty as usize);
+            let length = |u: Option<f32>, v: Option<f32>| u.zip(v).map_or(-1.0, |(u, v)| u.hypot(v));
+            if u.hypot(v) > length(back.u.get(tx, ty), back.v.get(tx, ty)) {
+                back.u.set(tx, ty, Some(-u));
+                back.v.set(tx, ty, Some(-v));
+            }
+        }
+    }
+    back
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Field, Grid};
+
+    #[test]
+    fn the_reverse_leads_back_and_keeps_the_nearer() {
+        let mut u = Field::missing(10, 3);
+        let mut v = Field::missing(10, 3);
+        for (x, du) in [(1, 4.2), (4, 1.0), (8, 5.0)] {
+            u.set(x, 1, Some(du));
+            v.set(x, 1, Some(1.0));
+        }
+        let back = reverse(&FlowField::prediction(u, v));
+        assert_eq!((back.u.get(5, 2), back.v.get(5, 2)), (Some(-4.2), Some(-1.0)));
+        assert_eq!(back.u.count(), 1);
+    }
+
+    #[test]
+    fn what_is_not_brought_back_is_dropped() {
+        let ones = Field::from_grid(Grid::filled(8, 8, 2.0));
+        let mut flow = FlowField::prediction(ones.clone(), ones);
+        let back = Grid::from_fn(4, 4, |x, _| if x < 2 { -1.0 } else { 1.0 });
+        reject(&mut flow, &Displacement { u: back, v: Grid::filled(4, 4, -1.0) }, 1, 0.5);
+        assert_eq!(flow.u.get(0, 3), Some(2.0));
+        assert_eq!((flow.u.get(4, 3), flow.v.get(4, 3)), (None, None));
+        assert!(flow.cov_uu.at(4, 3).is_nan());
+    }
+}

@@ -1,0 +1,93 @@
+//! Settings of the dense flow.
+
+use super::{FlowError, search};
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`dense_flow`](super::dense_flow); grey levels are those of 8-bit images.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FlowOptions {
+    /// Distance of neighbouring 8×8 patches, 1 … 8 pixels of each level; smaller is slower and denser.
+    pub patch_stride_px: usize,
+    /// Most iterations of a patch at a level.
+    pub search_iterations: usize,
+    /// How often a patch tries what its four neighbours found.
+    pub propagation_rounds: usize,
+    /// Level at which the search ends (0: full resolution); the refinement takes it from there.
+    pub finest_search_level: usize,
+    /// Coarsest level at which the initial flow takes part in the search.
+    pub initial_level: usize,
+    /// Radius of the window of the refinement, 1 … 15 pixels.
+    pub window_radius_px: usize,
+    /// Iterations of the refinement, at least 1.
+    pub refine_iterations: usize,
+    /// Standard deviation of the difference of two grey values when nothing is wrong: least value of
+    /// what is estimated locally from the residual.
+    pub noise_floor: f32,
+    /// Standard deviation added to each component for what the residual does not show (interpolation,
+    /// aliasing), in pixels.
+    pub sigma_floor_px: f32,
+    /// A pixel is missing if the larger semi-axis of its covariance exceeds this, in pixels.
+    pub max_sigma_px: f32,
+    /// A pixel is missing if the residual of its window exceeds this root mean square, in grey levels.
+    pub max_residual: f32,
+    /// A pixel is missing if forward and backward flow disagree by more than this, in pixels;
+    /// infinite: backward flow is not computed.
+    pub consistency_px: f32,
+    /// Level at which the search of the backward flow ends.
+    pub consistency_level: usize,
+}
+
+impl Default for FlowOptions {
+    fn default() -> Self {
+        Self {
+            patch_stride_px: 4,
+            search_iterations: 12,
+            propagation_rounds: 2,
+            finest_search_level: 1,
+            initial_level: 2,
+            window_radius_px: 4,
+            refine_iterations: 3,
+            noise_floor: 0.7,
+            sigma_floor_px: 0.02,
+            max_sigma_px: 0.5,
+            max_residual: 25.0,
+            consistency_px: 1.5,
+            consistency_level: 1,
+        }
+    }
+}
+
+impl FlowOptions {
+    /// Refuse what lies outside its range.
+    pub(super) fn check(&self) -> Result<(), FlowError> {
+        let rules = [
+            ((1..=search::PATCH).contains(&self.patch_stride_px), "patch_stride_px must be 1 … 8"),
+            ((1..=15).contains(&self.window_radius_px), "window_radius_px must be 1 … 15"),
+            (self.refine_iterations >= 1, "refine_iterations must be at least 1"),
+            (self.noise_floor > 0.0, "noise_floor must be positive"),
+            (self.sigma_floor_px >= 0.0, "sigma_floor_px must not be negative"),
+            (self.max_sigma_px > 0.0, "max_sigma_px must be positive"),
+            (self.max_residual > 0.0, "max_residual must be positive"),
+            (self.consistency_px > 0.0, "consistency_px must be positive"),
+        ];
+        rules.iter().find(|(ok, _)| !ok).map_or(Ok(()), |(_, rule)| Err(FlowError::Option(rule)))
+    }
+
+    /// Weights of the refinement's window along one axis, −radius … radius, their sum 1.
+    pub(super) fn window_weights(&self) -> Vec<f32> {
+        let r = self.window_radius_px as f32 + 1.0;
+        let weight = |i: usize| 1.0 - ((i as f32 + 1.0 - r) / r).powi(2);
+        let weights: Vec<f32> = (0..2 * self.window_radius_px + 1).map(weight).collect();
+        let sum: f32 = weights.iter().sum();
+        weights.into_iter().map(|w| w / sum).collect()
+    }
+
+    /// Number of neighbouring pixels that share one independent error, (Σw)²/Σw² of the window: the sum
+    /// of the autocorrelation of the flow's error. Who sums over pixels as if they were independent
+    /// makes the covariance of the sum too small by this factor.
+    pub fn correlation_area_px(&self) -> f32 {
+        let squares: f32 = self.window_weights().iter().map(|w| w * w).sum();
+        1.0 / (squares * squares)
+    }
+}

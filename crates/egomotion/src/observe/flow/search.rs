@@ -1,0 +1,296 @@
+//! Dense inverse search at one level: overlapping 8×8 patches, each with its own displacement.
+//!
+//! Inverse-compositional and mean-compensated: with template T, its gradients g and the patch J moved by
+//! the displacement, H = Σ (g − ḡ)(g − ḡ)ᵀ is fixed and each step is −H⁻¹ Σ (g − ḡ)(J − T).
+
+use super::sampling::interpolate;
+use super::{Displacement, FlowField, FlowOptions};
+use crate::geometry::{Grid, Image};
+use crate::observe::pyramid::{Gradients, gradients};
+use rayon::prelude::*;
+
+/// Side of a patch, in pixels.
+pub(super) const PATCH: usize = 8;
+/// Pixels of the patch.
+const AREA: f32 = (PATCH * PATCH) as f32;
+/// Width of the border by which the second image is continued, so that patches may leave it.
+const MARGIN: usize = 2 * PATCH;
+/// Added to the diagonal of H, in (grey levels per pixel)²: without texture a patch stays where it began.
+const DAMPING: f32 = 32.0;
+/// A patch that strays farther than this from where it began, in pixels of its level, is put back.
+const MAX_STRAY: f32 = PATCH as f32;
+/// A patch is done when its step is shorter than this, in pixels of its level.
+const SMALL_STEP: f32 = 0.02;
+/// What a neighbour found is taken up only if it lowers the cost by this factor.
+const CLEARLY_BETTER: f32 = 0.95;
+
+/// Two images of one level, made ready for search.
+pub(super) struct Pair<'a> {
+    pub from: &'a Image,
+    gradients: Gradients,
+    /// The second image with a border of [`MARGIN`] repeated pixels.
+    to: Image,
+}
+
+impl<'a> Pair<'a> {
+    pub fn new(from: &'a Image, to: &Image) -> Self {
+        let (width, height) = to.size();
+        let mut padded = Grid::filled(width + 2 * MARGIN, height + 2 * MARGIN, 0.0_f32);
+        let stride = padded.width();
+        padded.values_mut().par_chunks_mut(stride).enumerate().for_each(|(y, row)| {
+            let source = to.row(y.saturating_sub(MARGIN).min(height - 1));
+            row[MARGIN..MARGIN + width].copy_from_slice(source);
+            row[..MARGIN].fill(source[0]);
+            row[MARGIN + width..].fill(source[width - 1]);
+        });
+        Self { from, gradients: gradients(from), to: padded }
+    }
+
+    /// The 8×8 pixels of the second image at (x, y), bilinear; clamped to the border's outer edge.
+    pub fn patch(&self, x: f32, y: f32) -> [[f32; PATCH]; PATCH] {
+        let place = |c: f32, size: usize| {
+            let c = (c + MARGIN as f32).clamp(0.0, (size - PATCH - 2) as f32);
+            (c as usize, c - c.floor())
+        };
+        let ((x, a), (y, b)) = (place(x, self.to.width()), place(y, self.to.height()));
+        let line = |y: usize| {
+            let mut out = [0.0_f32; PATCH];
+            if let Some(source) = self.to.row(y).get(x..).and_then(|s| s.first_chunk::<{ PATCH + 1 }>()) {
+                for i in 0..PATCH {
+                    out[i] = source[i] + a * (source[i + 1] - source[i]);
+                }
+            }
+            out
+        };
+        let mut patch = [[0.0_f32; PATCH]; PATCH];
+        let mut above = line(y);
+        for (k, out) in patch.iter_mut().enumerate() {
+            let below = line(y + k + 1);
+            for i in 0..PATCH {
+                out[i] = above[i] + b * (below[i] - above[i]);
+            }
+            above = below;
+        }
+        patch
+    }
+}
+
+/// A patch's displacement, in pixels of its level, and its cost.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Match {
+    pub u: f32,
+    pub v: f32,
+    /// Variance of the difference of the two patches, in squared grey levels.
+    pub cost: f32,
+}
+
+/// The patches of a level, row by row; the last of each row and column touches the border.
+pub(super) struct Patches {
+    pub columns: usize,
+    pub rows: usize,
+    stride: usize,
+    size: (usize, usize),
+    pub matches: Vec<Match>,
+}
+
+impl Patches {
+    /// Upper left pixel of the patch (column, row).
+    pub fn corner(&self, column: usize, row: usize) -> (usize, usize) {
+        ((column * self.stride).min(self.size.0 - PATCH), (row * self.stride).min(self.size.1 - PATCH))
+    }
+}
+
+/// What a patch of the first image looks for.
+struct Template {
+    x: f32,
+    y: f32,
+    grey: [[f32; PATCH]; PATCH],
+    du: [[f32; PATCH]; PATCH],
+    dv: [[f32; PATCH]; PATCH],
+    mean_du: f32,
+    mean_dv: f32,
+    /// (H + damping)⁻¹: uu, uv, vv.
+    inverse: [f32; 3],
+}
+
+/// The 8×8 values of `plane` from (x, y), which lie inside.
+fn block(plane: &Grid<f32>, x: usize, y: usize) -> [[f32; PATCH]; PATCH] {
+    let mut out = [[0.0; PATCH]; PATCH];
+    for (k, out) in out.iter_mut().enumerate() {
+        out.copy_from_slice(&plane.row(y + k)[x..x + PATCH]);
+    }
+    out
+}
+
+/// Σ a b over the patch, in eight lanes.
+fn dot(a: &[[f32; PATCH]; PATCH], b: &[[f32; PATCH]; PATCH]) -> f32 {
+    let mut lanes = [0.0_f32; PATCH];
+    for (a, b) in a.iter().zip(b) {
+        for i in 0..PATCH {
+            lanes[i] += a[i] * b[i];
+        }
+    }
+    lanes.iter().sum()
+}
+
+impl Template {
+    fn new(pair: &Pair<'_>, (x, y): (usize, usize)) -> Self {
+        const ONES: [[f32; PATCH]; PATCH] = [[1.0; PATCH]; PATCH];
+        let grey = block(pair.from, x, y);
+        let (du, dv) = (block(&pair.gradients.du, x, y), block(&pair.gradients.dv, x, y));
+        let (mean_du, mean_dv) = (dot(&du, &ONES) / AREA, dot(&dv, &ONES) / AREA);
+        let uu = dot(&du, &du) - AREA * mean_du * mean_du + DAMPING;
+        let uv = dot(&du, &dv) - AREA * mean_du * mean_dv;
+        let vv = dot(&dv, &dv) - AREA * mean_dv * mean_dv + DAMPING;
+        let det = uu * vv - uv * uv;
+        Self {
+            x: x as f32,
+            y: y as f32,
+            grey,
+            du,
+            dv,
+            mean_du,
+            mean_dv,
+            inverse: [vv / det, -uv / det, uu / det],
+        }
+    }
+
+    /// The cost of a displacement, and the step that lowers it.
+    fn evaluate(&self, pair: &Pair<'_>, u: f32, v: f32) -> (f32, [f32; 2]) {
+        let moved = pair.patch(self.x + u, self.y + v);
+        let [mut sum, mut squares, mut du, mut dv] = [[0.0_f32; PATCH]; 4];
+        for k in 0..PATCH {
+            for i in 0..PATCH {
+                let r = moved[k][i] - self.grey[k][i];
+                sum[i] += r;
+                squares[i] += r * r;
+                du[i] += r * self.du[k][i];
+                dv[i] += r * self.dv[k][i];
+            }
+        }
+        let total = |lanes: [f32; PATCH]| lanes.iter().sum::<f32>();
+        let mean = total(sum) / AREA;
+        let cost = total(squares) / AREA - mean * mean;
+        let (bu, bv) = (total(du) - AREA * mean * self.mean_du, total(dv) - AREA * mean * self.mean_dv);
+        let [uu, uv, vv] = self.inverse;
+        (cost, [-(uu * bu + uv * bv), -(uv * bu + vv * bv)])
+    }
+
+    /// Descend from (u, v); where it began if that leads nowhere.
+    fn descend(&self, pair: &Pair<'_>, u: f32, v: f32, iterations: usize) -> Match {
+        let (cost, mut step) = self.evaluate(pair, u, v);
+        let mut best = Match { u, v, cost };
+        for _ in 0..iterations {
+            let (next_u, next_v) = (best.u + step[0], best.v + step[1]);
+            if !((next_u - u).abs().max((next_v - v).abs()) < MAX_STRAY) {
+                return Match { u, v, cost };
+            }
+            let (next_cost, next_step) = self.evaluate(pair, next_u, next_v);
+            if !(next_cost < best.cost) {
+                break;
+            }
+            best = Match { u: next_u, v: next_v, cost: next_cost };
+            let length = step[0].abs().max(step[1].abs());
+            step = next_step;
+            if length < SMALL_STEP {
+                break;
+            }
+        }
+        best
+    }
+}
+
+/// Search the displacement of every patch of a level.
+///
+/// Each begins at the better of what the `coarser` level found and the `prediction` (a flow at full
+/// resolution, and this level), then takes up what its neighbours found if that fits clearly better.
+/// The coarsest level gets more rounds of that, since it has nothing else to begin with.
+pub(super) fn search(
+    pair: &Pair<'_>,
+    coarser: Option<&Displacement>,
+    prediction: Option<(&FlowField, usize)>,
+    is_coarsest: bool,
+    options: &FlowOptions,
+) -> Patches {
+    let size = pair.from.size();
+    let stride = options.patch_stride_px;
+    let count = |side: usize| (side - PATCH).div_ceil(stride) + 1;
+    let mut patches = Patches { columns: count(size.0), rows: count(size.1), stride, size, matches: vec![] };
+    let places: Vec<(usize, usize)> =
+        (0..patches.rows).flat_map(|row| (0..patches.columns).map(move |column| (column, row))).collect();
+    let templates: Vec<Template> =
+        places.par_iter().map(|&(column, row)| Template::new(pair, patches.corner(column, row))).collect();
+
+    patches.matches = templates
+        .par_iter()
+        .map(|template| {
+            let centre = (template.x + 0.5 * PATCH as f32, template.y + 0.5 * PATCH as f32);
+            let (u, v) = begin(pair, template, centre, coarser, prediction);
+            template.descend(pair, u, v, options.search_iterations)
+        })
+        .collect();
+    for _ in 0..options.propagation_rounds * if is_coarsest { 2 } else { 1 } {
+        let before = &patches.matches;
+        let after = |(i, &(column, row)): (usize, &(usize, usize))| {
+            let neighbours = [
+                (column > 0).then(|| i - 1),
+                (column + 1 < patches.columns).then_some(i + 1),
+                (row > 0).then(|| i - patches.columns),
+                (row + 1 < patches.rows).then_some(i + patches.columns),
+            ];
+            from_neighbours(pair, &templates[i], before, i, neighbours, options.search_iterations)
+        };
+        patches.matches = places.par_iter().enumerate().map(after).collect();
+    }
+    patches
+}
+
+/// Where a patch begins: the better of the coarser level's displacement and the predicted one.
+fn begin(
+    pair: &Pair<'_>,
+    template: &Template,
+    (x, y): (f32, f32),
+    coarser: Option<&Displacement>,
+    prediction: Option<(&FlowField, usize)>,
+) -> (f32, f32) {
+    let found = coarser.map_or((0.0, 0.0), |flow| {
+        (2.0 * interpolate(&flow.u, 0.5 * x, 0.5 * y), 2.0 * interpolate(&flow.v, 0.5 * x, 0.5 * y))
+    });
+    let predicted = prediction.and_then(|(flow, level)| {
+        let scale = (1_usize << level) as f32;
+        let (column, row) = ((x * scale) as usize, (y * scale) as usize);
+        let (column, row) = (column.min(flow.u.width() - 1), row.min(flow.u.height() - 1));
+        Some((flow.u.get(column, row)? / scale, flow.v.get(column, row)? / scale))
+    });
+    match predicted {
+        Some(p) if template.evaluate(pair, p.0, p.1).0 < template.evaluate(pair, found.0, found.1).0 => p,
+        _ => found,
+    }
+}
+
+/// The best of a patch's own match and its neighbours', taken up and refined if clearly better.
+fn from_neighbours(
+    pair: &Pair<'_>,
+    template: &Template,
+    before: &[Match],
+    own: usize,
+    neighbours: [Option<usize>; 4],
+    iterations: usize,
+) -> Match {
+    let own = before[own];
+    let mut best = Match { cost: own.cost * CLEARLY_BETTER, ..own };
+    for other in neighbours.into_iter().flatten().map(|i| before[i]) {
+        if (other.u - own.u).abs() + (other.v - own.v).abs() < 0.25 {
+            continue;
+        }
+        let (cost, _) = template.evaluate(pair, other.u, other.v);
+        if cost < best.cost {
+            best = Match { cost, ..other };
+        }
+    }
+    if best.cost < own.cost * CLEARLY_BETTER {
+        template.descend(pair, best.u, best.v, iterations)
+    } else {
+        own
+    }
+}
