@@ -152,8 +152,8 @@ fn depth_velocity_differential() {
         }
         near(change.depth.cov[(0, 0)], get("var_Z"), EXACT);
         near(change.depth.cov[(1, 1)], get("var_Zx"), EXACT);
-        near(vz::dcce(&change).value(), get("VZ"), EXACT);
-        near(vz::dcce(&change).variance(), get("var_corr"), EXACT);
+        near(vz::dcce(&change).vz().value(), get("VZ"), EXACT);
+        near(vz::dcce(&change).vz().variance(), get("var_corr"), EXACT);
         near(vz::dcce_variance_as_printed(&flow, bf), get("var_paper39"), EXACT);
         let (disparity, velocity) = vz::dcce_coefficients(&flow, bf);
         near(disparity, get("coef1_disp"), EXACT);
@@ -171,8 +171,8 @@ fn depth_velocity_differential() {
         };
         near(bf / get("d"), get("Z"), EXACT);
         near(flow.disparity_rate(), get("delta_v"), EXACT);
-        near(vz::dv(&flow, bf).value(), get("VZ"), EXACT);
-        near(vz::dv(&flow, bf).variance(), get("var44"), EXACT);
+        near(vz::dv(&flow, bf).vz().value(), get("VZ"), EXACT);
+        near(vz::dv(&flow, bf).vz().variance(), get("var44"), EXACT);
         let (disparity, velocity) = vz::dv_coefficients(&flow, bf);
         near(disparity, get("coef2_disp"), EXACT);
         near(velocity, get("coef2_vel"), EXACT);
@@ -194,7 +194,7 @@ fn depth_velocity_discrete() {
             ),
             displacement: Gaussian::independent([get("Dx"), get("Dy")], [get("sxx") + get("sx1x1"); 2]),
         };
-        let computed = vz::dcce(&track.depth_change(bf));
+        let computed = vz::dcce(&track.depth_change(bf)).vz();
         near(computed.value(), get("VZ"), EXACT);
         near(computed.variance(), get("var_corr"), EXACT);
         let printed = vz::dcce_discrete_variance_as_printed(&track, bf);
@@ -204,13 +204,13 @@ fn depth_velocity_discrete() {
         let get = |k: &str| num(&case[k]);
         let end = |d: f64, var: f64| Gaussian::independent([0.0, 0.0, d], [0.0, 0.0, var]);
         let track = StereoTrack { before: end(get("d"), get("sdd")), after: end(get("d1"), get("sd1d1")) };
-        near(vz::dv_discrete(&track, bf).value(), get("VZ"), EXACT);
-        near(vz::dv_discrete(&track, bf).variance(), get("var50"), EXACT);
+        near(vz::dv_discrete(&track, bf).vz().value(), get("VZ"), EXACT);
+        near(vz::dv_discrete(&track, bf).vz().variance(), get("var50"), EXACT);
         near(vz::dv_discrete_variance_as_printed(&track, bf), get("var49"), EXACT);
         // The discrete DV is the differential one on the discrete flow.
         let flow = track.discrete_flow();
-        near(vz::dv(&flow, bf).value(), get("VZ"), EXACT);
-        near(vz::dv(&flow, bf).variance(), get("var50"), EXACT);
+        near(vz::dv(&flow, bf).vz().value(), get("VZ"), EXACT);
+        near(vz::dv(&flow, bf).vz().variance(), get("var50"), EXACT);
     }
 }
 

@@ -1,26 +1,68 @@
-//! VZ of one pixel by the paper's four methods, and by the un-linearised (6), each with its variance.
+//! VZ of one pixel by the paper's four methods, by the un-linearised (6), and as part of a rigid scene.
 
-use nalgebra::{Vector2, Vector4};
+use nalgebra::{Matrix2, SMatrix, Vector2, Vector3, Vector4, Vector6};
 
-use crate::geometry::{Field, Gaussian, StereoRig, Twist};
+use crate::geometry::{Field, Gaussian, RigidMotion, StereoRig, Twist};
 use crate::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 
-/// VZ = Zx v_x + Zy v_y + Zt in metres per interval: (7) of a [`DepthFlow`], (17) of a [`DepthTrack`].
+/// Depth and depth velocity of one pixel, with their joint covariance.
+///
+/// The two share the noise of disparity, so time to impact needs them together.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthVelocity {
+    /// (Z, VZ): depth at t in metres, its change in metres per interval.
+    pub z_vz: Gaussian<2>,
+}
+
+impl DepthVelocity {
+    /// VZ with its variance, in metres per interval; negative approaches.
+    pub fn vz(&self) -> Gaussian<1> {
+        Gaussian::scalar(self.z_vz.mean.y, self.z_vz.cov[(1, 1)])
+    }
+
+    /// Looming −VZ/(Z′ Δt) at the later frame, in 1/s, with Z′ = Z + VZ; `None` unless Z′ > 0.
+    pub fn looming(&self, dt_s: f64) -> Option<Gaussian<1>> {
+        let [z, vz] = self.z_vz.mean.into();
+        let later = z + vz;
+        if later.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+            return None;
+        }
+        // −VZ/Z′ = Z/Z′ − 1.
+        let gradient = SMatrix::<f64, 1, 2>::new(vz, -z) / (later * later);
+        let per_interval = self.z_vz.propagate(SMatrix::<f64, 1, 1>::new(-vz / later), &gradient);
+        Some(Gaussian::scalar(per_interval.value() / dt_s, per_interval.variance() / (dt_s * dt_s)))
+    }
+
+    /// From disparity before and after (d, d′) and their joint covariance; `bf` is b f. Needs d, d′ > 0.
+    pub fn from_disparities(disparities: &Gaussian<2>, bf: f64) -> Self {
+        let [d, after] = disparities.mean.into();
+        let jacobian = Matrix2::new(-bf / (d * d), 0.0, bf / (d * d), -bf / (after * after));
+        let mean = Vector2::new(bf / d, -bf / (d * after) * (after - d));
+        Self { z_vz: disparities.propagate(mean, &jacobian) }
+    }
+}
+
+/// VZ = Zx v_x + Zy v_y + Zt: (7) of a [`DepthFlow`], (17) of a [`DepthTrack`].
 ///
 /// Its variance is (39c) and (47c): the shared disparity is accounted for.
-pub fn dcce(change: &DepthChange) -> Gaussian<1> {
-    let [_, zx, zy, zt] = change.depth.mean.into();
+pub fn dcce(change: &DepthChange) -> DepthVelocity {
+    let [z, zx, zy, zt] = change.depth.mean.into();
     let [vx, vy] = change.flow.mean.into();
-    let (by_depth, by_flow) = (Vector4::new(0.0, vx, vy, 1.0), Vector2::new(zx, zy));
-    let variance = by_depth.dot(&(change.depth.cov * by_depth)) + by_flow.dot(&(change.flow.cov * by_flow));
-    Gaussian::scalar(zx * vx + zy * vy + zt, variance)
+    let by_depth = SMatrix::<f64, 2, 4>::from_rows(&[
+        Vector4::x().transpose(),
+        Vector4::new(0.0, vx, vy, 1.0).transpose(),
+    ]);
+    let by_flow = Vector2::new(zx, zy);
+    let mut z_vz = change.depth.propagate(Vector2::new(z, zx * vx + zy * vy + zt), &by_depth);
+    z_vz.cov[(1, 1)] += by_flow.dot(&(change.flow.cov * by_flow));
+    DepthVelocity { z_vz }
 }
 
 /// Variance of (7) as printed in (39): Zx, Zy and Zt taken as independent; `bf` is b f.
 pub fn dcce_variance_as_printed(flow: &DepthFlow, bf: f64) -> f64 {
     let mut change = flow.depth_change(bf);
     change.depth = change.depth.without_correlation();
-    dcce(&change).variance()
+    dcce(&change).vz().variance()
 }
 
 /// Variance of (17) as printed in (47); `bf` is b f.
@@ -41,30 +83,40 @@ pub fn dcce_coefficients(flow: &DepthFlow, bf: f64) -> (f64, f64) {
     (part([1.0, 0.5, 0.5, 0.5], [0.0; 2]), part([0.0; 4], [1.0; 2]))
 }
 
-/// VZ = −(Z²/(b f)) Δv in metres per interval, (9), with variance (44); `bf` is b f.
-pub fn dv(flow: &StereoFlow, bf: f64) -> Gaussian<1> {
+/// VZ = −(Z²/(b f)) Δv, (9), with variance (44); `bf` is b f.
+pub fn dv(flow: &StereoFlow, bf: f64) -> DepthVelocity {
     let d = flow.measured.mean[0];
     let slope = -bf / (d * d);
     let vz = slope * flow.disparity_rate();
-    let gradient = Vector4::new(-2.0 * vz / d, slope, 0.0, -slope);
-    Gaussian::scalar(vz, gradient.dot(&(flow.measured.cov * gradient)))
+    let jacobian = SMatrix::<f64, 2, 4>::new(
+        slope,
+        0.0,
+        0.0,
+        0.0, //
+        -2.0 * vz / d,
+        slope,
+        0.0,
+        -slope,
+    );
+    DepthVelocity { z_vz: flow.measured.propagate(Vector2::new(bf / d, vz), &jacobian) }
 }
 
 /// Coefficients (of σ²_d, of σ²_v) in the variance of (9), equation (53), with σ_v alike left and right; `bf` is b f.
 pub fn dv_coefficients(flow: &StereoFlow, bf: f64) -> (f64, f64) {
     let part = |variances: [f64; 4]| {
         let measured = Gaussian::independent(flow.measured.mean.into(), variances);
-        dv(&StereoFlow { measured, ..*flow }, bf).variance()
+        dv(&StereoFlow { measured, ..*flow }, bf).vz().variance()
     };
     (part([1.0, 0.0, 0.0, 0.0]), part([0.0, 1.0, 1.0, 1.0]))
 }
 
-/// VZ = −(Z Z′/(b f)) (d′ − d), which is Z′ − Z, in metres per interval, (21), with variance (50); `bf` is b f.
-pub fn dv_discrete(track: &StereoTrack, bf: f64) -> Gaussian<1> {
-    let (d, after) = (track.before.mean.z, track.after.mean.z);
-    let variance = (bf / (d * d)).powi(2) * track.before.cov[(2, 2)]
-        + (bf / (after * after)).powi(2) * track.after.cov[(2, 2)];
-    Gaussian::scalar(-bf / (d * after) * (after - d), variance)
+/// VZ = −(Z Z′/(b f)) (d′ − d), which is Z′ − Z, (21), with variance (50); `bf` is b f.
+pub fn dv_discrete(track: &StereoTrack, bf: f64) -> DepthVelocity {
+    let disparities = Gaussian::independent(
+        [track.before.mean.z, track.after.mean.z],
+        [track.before.cov[(2, 2)], track.after.cov[(2, 2)]],
+    );
+    DepthVelocity::from_disparities(&disparities, bf)
 }
 
 /// Variance of (21) as printed in (49), which takes Z, Z′, d and d′ as independent; `bf` is b f.
@@ -79,32 +131,84 @@ pub fn dv_discrete_variance_as_printed(track: &StereoTrack, bf: f64) -> f64 {
         / (bf * bf)
 }
 
-/// VZ = Z(x + vx, y + vy, t + 1) − Z(x, y, t), the exact change of depth, (6).
+/// VZ = Z(x + vx, y + vy, t + 1) − Z(x, y, t), the exact change of depth, (6), in metres per interval.
 ///
-/// `z_m` is Z at t; `after` holds the disparity at t + 1 on pixels, and (`u`, `v`) is where the point
-/// has moved to, in pixels. Disparity is interpolated, not Z. `None` where it is missing.
+/// `z_m` is Z at t; `after` holds the disparity d at t + 1 on pixels, and (`u`, `v`) is where the
+/// point has moved to, in pixels. Disparity is interpolated, not Z. `None` where it is missing.
 pub fn exact_change(z_m: f64, after: &Field, u: f64, v: f64, rig: &StereoRig) -> Option<f64> {
     Some(rig.depth(after.sample(u, v)?)? - z_m)
 }
 
-/// VZ of the point (x, y, d) as part of the rigid scene moving by φ: Z′ − Z over the interval, in metres.
+/// The rigid motion φ with what every pixel's prediction shares.
+#[derive(Debug, Clone, Copy)]
+pub struct RigidPrediction<'a> {
+    rig: &'a StereoRig,
+    motion: RigidMotion,
+    left_jacobian: nalgebra::Matrix6<f64>,
+    cov: nalgebra::Matrix6<f64>,
+}
+
+impl<'a> RigidPrediction<'a> {
+    /// Predict with φ ± its covariance; `None` where some component of φ is unknown.
+    pub fn new(phi: &Gaussian<6>, rig: &'a StereoRig) -> Option<Self> {
+        let twist = Twist::from_vector(&phi.mean);
+        phi.cov.iter().all(|v| v.is_finite()).then(|| Self {
+            rig,
+            motion: twist.exp(),
+            left_jacobian: twist.left_jacobian(),
+            cov: phi.cov,
+        })
+    }
+
+    /// The rigid motion exp(φ).
+    pub fn motion(&self) -> &RigidMotion {
+        &self.motion
+    }
+
+    /// Where a point measured as (x, y, d) goes: (x′, y′, d′); `None` behind the camera.
+    pub fn moved(&self, xyd: &Vector3<f64>) -> Option<Vector3<f64>> {
+        self.rig.project(&self.motion.apply(&self.rig.point(xyd)?))
+    }
+
+    /// Z and VZ of the still world's point (x, y, d), from the noise `sigma_d` of d and that of φ.
+    pub fn depth_velocity(&self, xyd: &Vector3<f64>, sigma_d: f64) -> Option<DepthVelocity> {
+        let p = self.rig.point(xyd)?;
+        let moved = self.motion.apply(&p);
+        if moved.z <= 0.0 {
+            return None;
+        }
+        let by_d = self.rig.point_jacobian(xyd).column(2).into_owned();
+        let vz_by_d = self.motion.rotation.row(2).dot(&by_d.transpose()) - by_d.z;
+        let by_phi: Vector6<f64> =
+            (RigidMotion::point_jacobian(&moved).row(2) * self.left_jacobian).transpose();
+        let var = sigma_d * sigma_d;
+        let cross = by_d.z * vz_by_d * var;
+        let cov = Matrix2::new(
+            by_d.z * by_d.z * var,
+            cross,
+            cross,
+            vz_by_d * vz_by_d * var + by_phi.dot(&(self.cov * by_phi)),
+        );
+        Some(DepthVelocity { z_vz: Gaussian { mean: Vector2::new(p.z, moved.z - p.z), cov } })
+    }
+}
+
+/// The rigid prediction where the measurement does not contradict it, else the measurement.
 ///
-/// `sigma_d` is the standard deviation of d. The covariance of φ and that of d are both propagated.
-pub fn rigid(
-    xyd: &nalgebra::Vector3<f64>,
-    sigma_d: f64,
-    phi: &Gaussian<6>,
-    rig: &StereoRig,
-) -> Option<Gaussian<1>> {
-    let p = rig.point(xyd)?;
-    let twist = Twist::from_vector(&phi.mean);
-    let motion = twist.exp();
-    let moved = motion.apply(&p);
-    let by_delta = crate::geometry::RigidMotion::point_jacobian(&moved).row(2).into_owned();
-    let by_phi = by_delta * twist.left_jacobian();
-    let by_d = (motion.rotation.row(2) * rig.point_jacobian(xyd))[2] - rig.point_jacobian(xyd)[(2, 2)];
-    let variance = (by_phi * phi.cov * by_phi.transpose())[0] + (by_d * sigma_d).powi(2);
-    Some(Gaussian::scalar(moved.z - p.z, variance))
+/// They contradict when they differ by more than three standard deviations of the difference: then
+/// the pixel moves by itself.
+pub fn rigid_unless_moving(
+    measured: Option<DepthVelocity>,
+    rigid: Option<DepthVelocity>,
+) -> Option<DepthVelocity> {
+    match (measured, rigid) {
+        (Some(m), Some(r)) => {
+            let variance = m.vz().variance() + r.vz().variance();
+            let apart = (m.vz().value() - r.vz().value()).powi(2) > 9.0 * variance;
+            Some(if apart { m } else { r })
+        }
+        (measured, rigid) => rigid.or(measured),
+    }
 }
 
 /// Smallest change of depth that a disparity step δ shows at disparity d, ΔZ = −Z/(1 + d/δ) in metres, (51).

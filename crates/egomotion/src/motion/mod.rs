@@ -1,3 +1,7 @@
 //! What the motion of pixels means: depth velocity and time to impact, each with its uncertainty.
 
 pub mod depth_velocity;
+pub mod impact;
+
+pub use depth_velocity::DepthVelocity;
+pub use impact::TimeToImpact;

@@ -6,10 +6,12 @@ pub mod flow;
 pub mod observation;
 pub mod patch;
 pub mod pyramid;
+pub mod sample;
 pub mod tracks;
 
 pub use disparity::{DisparityMap, DisparityMatcher, DisparityOptions};
 pub use flow::{FlowField, FlowOptions, dense_flow};
 pub use observation::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 pub use pyramid::Pyramid;
+pub use sample::DensePair;
 pub use tracks::{StereoPyramid, TrackOptions};

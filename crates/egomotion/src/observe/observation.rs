@@ -159,13 +159,6 @@ impl StereoFlow {
 }
 
 impl StereoTrack {
-    /// Looming −(Z′ − Z)/Z′ = (d′ − d)/d per interval, which needs neither b nor f; at the later frame.
-    pub fn looming(&self) -> Gaussian<1> {
-        let (d, after) = (self.before.mean.z, self.after.mean.z);
-        let (var, var_after) = (self.before.cov[(2, 2)], self.after.cov[(2, 2)]);
-        Gaussian::scalar(after / d - 1.0, (after / d).powi(2) * var / (d * d) + var_after / (d * d))
-    }
-
     /// The flow that the discrete DV method works with: displacement, and Δv → (d′ − d) Z′/Z.
     pub fn discrete_flow(&self) -> StereoFlow {
         let (a, b) = (self.before.mean, self.after.mean);

@@ -262,8 +262,9 @@ impl Trace {
         let end = |(u, v, shift): (f64, f64, f64), plane: &Matrix2<f64>, row: f64| {
             let (x, y) = rig.image_from_pixel(u, v);
             let (xx, xy, yy) = (plane[(0, 0)], plane[(0, 1)] * aspect, plane[(1, 1)] * aspect * aspect);
-            // d = u_left − u_right: the left image's noise is in x and in d alike.
-            let cov = Matrix3::new(xx, xy, xx, xy, yy, xy, xx, xy, xx + row) * noise;
+            // d is located along the row alone, from the same noise of the left window as x: that
+            // makes cov(x, d) = 1/G_xx, cov(y, d) = 0, and the right window adds as much again.
+            let cov = Matrix3::new(xx, xy, row, xy, yy, 0.0, row, 0.0, 2.0 * row) * noise;
             Gaussian { mean: Vector3::new(x, y, rig.disparity_from_shift(shift)), cov }
         };
         let (plane, row, plane_after, row_after) = &self.shapes;

@@ -49,9 +49,8 @@ pub(super) fn transform(image: &Image, window: CensusWindow, words: &mut Vec<u64
         return;
     }
     words.par_chunks_mut(width).enumerate().for_each(|(v, words)| {
-        let rows: Vec<Vec<f32>> = (0..=2 * rv)
-            .map(|j| padded(image.row((v + j).saturating_sub(rv).min(height - 1)), ru))
-            .collect();
+        let rows: Vec<Vec<f32>> =
+            (0..=2 * rv).map(|j| padded(image.row((v + j).saturating_sub(rv).min(height - 1)), ru)).collect();
         // Two halves of 32 bits vectorise twice as wide as one word of 64.
         let half = rows.len() / 2;
         let centre = image.row(v);

@@ -151,23 +151,25 @@ impl Refinement {
     fn compare(&mut self, left: &Image, right: &Image) {
         let layout = self.layout;
         let planes = layout.rows(&mut self.disparity).zip(layout.rows(&mut self.difference));
-        planes.zip(layout.rows(&mut self.slope)).for_each(|(((v, disparity), (_, difference)), (_, slope))| {
-            let (left, right) = (left.row(v), right.row(v));
-            for (u, disparity) in disparity.iter_mut().enumerate() {
-                let neighbours = (u.checked_sub(1).and_then(|u| left.get(u)), left.get(u + 1));
-                let read = cubic(right, u as f32 - *disparity);
-                (difference[u], slope[u]) = match (neighbours, read) {
-                    ((Some(before), Some(after)), Some((grey, gradient))) => {
-                        // The mean of both gradients is right to second order.
-                        (left[u] - grey, 0.5 * (0.5 * (after - before) + gradient))
-                    }
-                    _ => {
-                        *disparity = f32::NAN;
-                        (0.0, 0.0)
-                    }
-                };
-            }
-        });
+        planes.zip(layout.rows(&mut self.slope)).for_each(
+            |(((v, disparity), (_, difference)), (_, slope))| {
+                let (left, right) = (left.row(v), right.row(v));
+                for (u, disparity) in disparity.iter_mut().enumerate() {
+                    let neighbours = (u.checked_sub(1).and_then(|u| left.get(u)), left.get(u + 1));
+                    let read = cubic(right, u as f32 - *disparity);
+                    (difference[u], slope[u]) = match (neighbours, read) {
+                        ((Some(before), Some(after)), Some((grey, gradient))) => {
+                            // The mean of both gradients is right to second order.
+                            (left[u] - grey, 0.5 * (0.5 * (after - before) + gradient))
+                        }
+                        _ => {
+                            *disparity = f32::NAN;
+                            (0.0, 0.0)
+                        }
+                    };
+                }
+            },
+        );
     }
 
     /// Median over the image of the noise variance of the last step; `None` before the first.
@@ -260,7 +262,13 @@ struct Fit {
 }
 
 impl Sums {
-    fn gather(window: &[(isize, f32)], at: usize, disparity: &[f32], difference: &[f32], slope: &[f32]) -> Self {
+    fn gather(
+        window: &[(isize, f32)],
+        at: usize,
+        disparity: &[f32],
+        difference: &[f32],
+        slope: &[f32],
+    ) -> Self {
         let mut sums = Self::default();
         let centre = lanes(disparity, at);
         for &(offset, tolerance) in window {

@@ -1,0 +1,184 @@
+//! Observations from dense fields: disparity of two frames and the flow between them.
+
+use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};
+use rayon::prelude::*;
+
+use super::disparity::DisparityMap;
+use super::flow::FlowField;
+use super::observation::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
+use crate::geometry::{Gaussian, StereoRig};
+
+/// The dense fields of one pair of frames.
+#[derive(Debug, Clone, Copy)]
+pub struct DensePair<'a> {
+    /// The rig.
+    pub rig: &'a StereoRig,
+    /// Disparity at t.
+    pub before: &'a DisparityMap,
+    /// Disparity at t′.
+    pub after: &'a DisparityMap,
+    /// Flow of the left camera from t to t′.
+    pub flow: &'a FlowField,
+    /// Flow of the right camera from t to t′; only the differential binocular flow needs it.
+    pub flow_right: Option<&'a FlowField>,
+}
+
+impl DensePair<'_> {
+    /// An observation of every `step`-th pixel in both directions, in row-major order.
+    pub fn every<T: Send>(
+        &self,
+        step: usize,
+        observe: impl Fn(&Self, usize, usize) -> Option<T> + Sync,
+    ) -> Vec<T> {
+        let (width, height) = self.flow.size();
+        let step = step.max(1);
+        (step / 2..height)
+            .into_par_iter()
+            .step_by(step)
+            .flat_map_iter(|v| {
+                (step / 2..width).step_by(step).filter_map(|u| observe(self, u, v)).collect::<Vec<_>>()
+            })
+            .collect()
+    }
+
+    /// (x, y, d) at t with its covariance: the pixel is exact, disparity is measured.
+    fn before(&self, u: usize, v: usize) -> Option<Gaussian<3>> {
+        let d = self.rig.disparity_from_shift(f64::from(self.before.shift.get(u, v)?));
+        let sigma = f64::from(self.before.sigma.get(u, v)?);
+        let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
+        (d > 0.0).then(|| Gaussian::independent([x, y, d], [0.0, 0.0, sigma * sigma]))
+    }
+
+    /// The flow at a pixel in image coordinates.
+    fn displacement(&self, u: usize, v: usize) -> Option<Gaussian<2>> {
+        let flow = self.flow.get(u, v)?;
+        let scale = Matrix2::from_diagonal(&Vector2::new(1.0, self.rig.aspect()));
+        Some(flow.propagate(scale * flow.mean, &scale))
+    }
+
+    /// The tracked point of a pixel: (x, y, d) before, and where flow and the later map put it after.
+    pub fn stereo_track(&self, u: usize, v: usize) -> Option<StereoTrack> {
+        let before = self.before(u, v)?;
+        let moved = self.displacement(u, v)?;
+        let (x, y) = (before.mean.x + moved.mean.x, before.mean.y + moved.mean.y);
+        let (later, gradient) = disparity_at(self.rig, self.after, x, y)?;
+        // d′ is read where flow says, so an error of flow moves it along the map's slope.
+        let cross = moved.cov * gradient;
+        let var = later.variance() + gradient.dot(&cross);
+        let c = &moved.cov;
+        let cov = Matrix3::new(
+            c[(0, 0)],
+            c[(0, 1)],
+            cross.x, //
+            c[(0, 1)],
+            c[(1, 1)],
+            cross.y, //
+            cross.x,
+            cross.y,
+            var,
+        );
+        Some(StereoTrack { before, after: Gaussian { mean: Vector3::new(x, y, later.value()), cov } })
+    }
+
+    /// Discrete DCCE: disparity at the pixel at t and t′, its gradient at t′, and the displacement.
+    pub fn depth_track(&self, u: usize, v: usize) -> Option<DepthTrack> {
+        let before = self.before(u, v)?;
+        let [x, y, d] = before.mean.into();
+        let (after, gradient) = disparity_at(self.rig, self.after, x, y)?;
+        let (var, var_after) = (before.cov[(2, 2)], after.variance());
+        Some(DepthTrack {
+            x_px: x,
+            y_px: y,
+            disparity: Gaussian::independent(
+                [d, after.value(), gradient.x, gradient.y],
+                [var, var_after, 0.5 * var_after, 0.5 * var_after],
+            ),
+            displacement: self.displacement(u, v)?,
+        })
+    }
+
+    /// Differential DCCE at the middle of the interval, half-way along the flow of the pixel.
+    ///
+    /// There the differences of one interval are central ones, so that the error of taking them for
+    /// derivatives is of third order in the motion.
+    pub fn depth_flow(&self, u: usize, v: usize) -> Option<DepthFlow> {
+        let flow = self.displacement(u, v)?;
+        let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
+        let (x, y) = (x + 0.5 * flow.mean.x, y + 0.5 * flow.mean.y);
+        let (a, slope_a) = disparity_at(self.rig, self.before, x, y)?;
+        let (b, slope_b) = disparity_at(self.rig, self.after, x, y)?;
+        let slope = 0.5 * (slope_a + slope_b);
+        let (sum, difference) = (a.variance() + b.variance(), b.variance() - a.variance());
+        let gradient = 0.5 * 0.25 * sum;
+        let cov = Matrix4::new(
+            0.25 * sum,
+            0.0,
+            0.0,
+            0.5 * difference, //
+            0.0,
+            gradient,
+            0.0,
+            0.0, //
+            0.0,
+            0.0,
+            gradient,
+            0.0, //
+            0.5 * difference,
+            0.0,
+            0.0,
+            sum,
+        );
+        let mean = Vector4::new(0.5 * (a.value() + b.value()), slope.x, slope.y, b.value() - a.value());
+        Some(DepthFlow { x_px: x, y_px: y, disparity: Gaussian { mean, cov }, flow })
+    }
+
+    /// Differential DV at the middle of the interval, from the flows of both cameras.
+    pub fn stereo_flow(&self, u: usize, v: usize) -> Option<StereoFlow> {
+        let before = self.before(u, v)?;
+        let left = self.displacement(u, v)?;
+        let right = self.flow_right?;
+        let at = u as f64 - self.rig.shift_from_disparity(before.mean.z);
+        let right_x = right.u.sample(at, v as f64)?;
+        let right_var = f64::from(right.cov_uu.at((at.round() as usize).min(right.size().0 - 1), v));
+        let rate = left.mean.x - right_x;
+        let (x, y) = (before.mean.x + 0.5 * left.mean.x, before.mean.y + 0.5 * left.mean.y);
+        let d = before.mean.z + 0.5 * rate;
+        let (l, r) = (&left.cov, right_var);
+        let (dx, dy) = (0.5 * l[(0, 0)], 0.5 * l[(0, 1)]);
+        let cov = Matrix4::new(
+            before.cov[(2, 2)] + 0.25 * (l[(0, 0)] + r),
+            dx,
+            dy,
+            -0.5 * r, //
+            dx,
+            l[(0, 0)],
+            l[(0, 1)],
+            0.0, //
+            dy,
+            l[(0, 1)],
+            l[(1, 1)],
+            0.0, //
+            -0.5 * r,
+            0.0,
+            0.0,
+            r,
+        );
+        let mean = Vector4::new(d, left.mean.x, left.mean.y, right_x);
+        (d > 0.0).then_some(StereoFlow { x_px: x, y_px: y, measured: Gaussian { mean, cov } })
+    }
+}
+
+/// Disparity at image coordinates (x, y) with its variance, and its gradient there by central differences.
+fn disparity_at(rig: &StereoRig, map: &DisparityMap, x: f64, y: f64) -> Option<(Gaussian<1>, Vector2<f64>)> {
+    let (u, v) = rig.pixel_from_image(x, y);
+    let shift = |du: f64, dv: f64| map.shift.sample(u + du, v + dv);
+    let d = rig.disparity_from_shift(shift(0.0, 0.0)?);
+    let sigma = map.sigma.sample(u, v)?;
+    let gradient = Vector2::new(
+        0.5 * (shift(1.0, 0.0)? - shift(-1.0, 0.0)?),
+        0.5 * (shift(0.0, 1.0)? - shift(0.0, -1.0)?) / rig.aspect(),
+    );
+    // Beyond one pixel of disparity per pixel the stencil straddles a depth edge.
+    let on_surface = gradient.amax() < 1.0;
+    (d > 0.0 && on_surface).then(|| (Gaussian::scalar(d, sigma * sigma), gradient))
+}

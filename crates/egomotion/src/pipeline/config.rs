@@ -1,0 +1,170 @@
+//! Every choice and every default, once.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::estimate::lmeds::LmedsOptions;
+use crate::estimate::m_estimator::StudentT;
+use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
+use crate::motion::impact::VehicleWindow;
+use crate::observe::{DisparityOptions, FlowOptions, TrackOptions};
+
+/// Which equations determine φ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// Maximum likelihood in the measured (x, y, d) at both times.
+    Ml,
+    /// Depth change constraint, (11).
+    Dcce,
+    /// Binocular flow in the paper's two steps, (14) then (3).
+    Dv,
+    /// Binocular flow and image flow solved together.
+    Joint,
+    /// Point pairs with a rotation, (22) constrained.
+    Rigid,
+    /// Point pairs with any matrix, (22) as a linear regression.
+    Linear22,
+}
+
+/// Velocities or finite motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Approach {
+    /// Finite displacements between two frames.
+    Discrete,
+    /// Velocities and derivatives, taken at the middle of the interval.
+    Differential,
+}
+
+/// How equations are solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EstimatorKind {
+    /// Least squares, all rows alike, as in the paper.
+    Ls,
+    /// Least median of squares.
+    Lmeds,
+    /// Iteratively reweighted least squares, rows weighted by their own variance.
+    Irls,
+}
+
+/// What is measured in the images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Observe {
+    /// Disparity and flow of every pixel, with all maps.
+    Dense,
+    /// Tracked corners alone: no maps, the highest rate.
+    Sparse,
+}
+
+/// Everything that can be chosen in a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Which equations determine φ.
+    pub method: Method,
+    /// Velocities or finite motion.
+    pub approach: Approach,
+    /// How equations are solved.
+    pub estimator: EstimatorKind,
+    /// What is measured in the images.
+    pub observe: Observe,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Side of the blocks of pixels that count as independent in covariances, in pixels.
+    pub block_px: f64,
+    /// Dense observations are taken from every n-th pixel in both directions.
+    pub sample_step_px: usize,
+    /// What the vehicle sweeps.
+    pub window: VehicleWindow,
+    /// Corners and their tracks.
+    pub tracks: TrackOptions,
+    /// Dense disparity.
+    pub disparity: DisparityOptions,
+    /// Dense flow.
+    pub flow: FlowOptions,
+    /// Robust weights of the linear methods with `irls`.
+    pub irls: StudentT,
+    /// Least median of squares.
+    pub lmeds: LmedsOptions,
+    /// Maximum likelihood.
+    pub maximum_likelihood: MaximumLikelihoodOptions,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            method: Method::Ml,
+            approach: Approach::Discrete,
+            estimator: EstimatorKind::Irls,
+            observe: Observe::Dense,
+            seed: 1,
+            block_px: 32.0,
+            sample_step_px: 3,
+            window: VehicleWindow::default(),
+            tracks: TrackOptions::default(),
+            disparity: DisparityOptions::default(),
+            flow: FlowOptions::default(),
+            irls: StudentT::default(),
+            lmeds: LmedsOptions::default(),
+            maximum_likelihood: MaximumLikelihoodOptions::default(),
+        }
+    }
+}
+
+/// Why a combination of choices has no meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+pub enum ConfigError {
+    /// Maximum likelihood has its own robust weights.
+    #[error(
+        "method ml weighs its observations robustly itself: use estimator irls (the default), not ls or lmeds"
+    )]
+    MaximumLikelihoodEstimator,
+    /// Alignment needs points before and after.
+    #[error(
+        "methods rigid and linear22 align points before and after: use approach discrete (the default), not differential"
+    )]
+    AlignmentApproach,
+    /// Tracks carry no gradient of disparity.
+    #[error(
+        "method dcce needs the gradient of disparity, which tracks do not have: use observe dense (the default), not sparse"
+    )]
+    SparseDepthChange,
+    /// A size that must be positive is not.
+    #[error("{0} must be positive")]
+    NotPositive(&'static str),
+}
+
+impl Config {
+    /// Whether the choices fit together.
+    ///
+    /// # Errors
+    /// [`ConfigError`] gives the reason.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        if self.method == Method::Ml && self.estimator != EstimatorKind::Irls {
+            return Err(ConfigError::MaximumLikelihoodEstimator);
+        }
+        let alignment = matches!(self.method, Method::Rigid | Method::Linear22);
+        if alignment && self.approach == Approach::Differential {
+            return Err(ConfigError::AlignmentApproach);
+        }
+        if self.method == Method::Dcce && self.observe == Observe::Sparse {
+            return Err(ConfigError::SparseDepthChange);
+        }
+        let positive = |value: f64| value.is_finite() && value > 0.0;
+        for (name, value) in [
+            ("block_px", self.block_px),
+            ("sample_step_px", self.sample_step_px as f64),
+            ("tracks.corners", self.tracks.corners as f64),
+            ("irls.nu", self.irls.nu.min(1e9)),
+            ("maximum_likelihood.kernel.nu", self.maximum_likelihood.kernel.nu.min(1e9)),
+        ] {
+            if !positive(value) {
+                return Err(ConfigError::NotPositive(name));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,175 @@
+//! The dense maps of a frame pair: depth velocity and time to impact of every pixel, each with its σ.
+
+use rayon::prelude::*;
+
+use super::config::{Approach, Config, Method};
+use crate::estimate::{Blocks, MotionEstimate};
+use crate::geometry::{Field, Grid};
+use crate::motion::DepthVelocity;
+use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
+use crate::motion::impact::{Candidate, TimeToImpact};
+use crate::observe::{DensePair, StereoTrack};
+
+/// Per-pixel results on the pixel grid of the earlier frame; missing pixels are NaN.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MotionMaps {
+    /// VZ, in metres per interval.
+    pub depth_velocity: Field,
+    /// Standard deviation of VZ.
+    pub depth_velocity_sigma: Field,
+    /// Time to impact in seconds, where the point approaches.
+    pub impact: Field,
+    /// Near end of its 95 % interval.
+    pub impact_lo: Field,
+    /// Far end, which may be infinite.
+    pub impact_hi: Grid<f32>,
+}
+
+/// Both of what one pixel shows.
+struct Pixel {
+    velocity: DepthVelocity,
+    impact: Option<TimeToImpact>,
+}
+
+/// VZ and time to impact of every pixel, and the candidates for the nearest obstacle.
+///
+/// With `dcce` and `dv` VZ is that method's own measurement at each pixel; with the others it is
+/// the rigid scene's, except where the measured change of disparity contradicts it.
+pub fn motion_maps(
+    pair: &DensePair<'_>,
+    motion: Option<&MotionEstimate>,
+    config: &Config,
+    dt_s: f64,
+) -> (MotionMaps, Vec<Candidate>) {
+    let (width, height) = pair.flow.size();
+    let rigid = motion.and_then(|m| RigidPrediction::new(&m.theta, pair.rig));
+    let blocks = Blocks::over(pair.rig, config.block_px);
+    let rows: Vec<(Vec<Option<Pixel>>, Vec<Candidate>)> = (0..height)
+        .into_par_iter()
+        .map(|v| {
+            let mut candidates = Vec::new();
+            let pixels = (0..width)
+                .map(|u| {
+                    let velocity = velocity_at(pair, rigid.as_ref(), config, u, v)?;
+                    let impact = velocity.looming(dt_s).map(|looming| TimeToImpact { looming });
+                    candidates.extend(candidate(
+                        pair,
+                        rigid.as_ref(),
+                        config,
+                        &blocks,
+                        (u, v),
+                        &velocity,
+                        dt_s,
+                    ));
+                    Some(Pixel { velocity, impact })
+                })
+                .collect();
+            (pixels, candidates)
+        })
+        .collect();
+    (
+        fill(width, height, rows.iter().map(|(pixels, _)| pixels)),
+        rows.into_iter().flat_map(|(_, c)| c).collect(),
+    )
+}
+
+fn velocity_at(
+    pair: &DensePair<'_>,
+    rigid: Option<&RigidPrediction<'_>>,
+    config: &Config,
+    u: usize,
+    v: usize,
+) -> Option<DepthVelocity> {
+    let bf = pair.rig.depth_disparity_product();
+    match (config.method, config.approach) {
+        (Method::Dcce, Approach::Discrete) => {
+            Some(depth_velocity::dcce(&pair.depth_track(u, v)?.depth_change(bf)))
+        }
+        (Method::Dcce, Approach::Differential) => {
+            Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)))
+        }
+        (Method::Dv, Approach::Differential) => Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf)),
+        (Method::Dv, Approach::Discrete) => Some(depth_velocity::dv_discrete(&pair.stereo_track(u, v)?, bf)),
+        _ => {
+            let measured = pair.stereo_track(u, v).map(|track| depth_velocity::dv_discrete(&track, bf));
+            let predicted = rigid.and_then(|rigid| {
+                let sigma = f64::from(pair.before.sigma.get(u, v)?);
+                let d = pair.rig.disparity_from_shift(f64::from(pair.before.shift.get(u, v)?));
+                let (x, y) = pair.rig.image_from_pixel(u as f64, v as f64);
+                rigid.depth_velocity(&nalgebra::Vector3::new(x, y, d), sigma)
+            });
+            rigid_unless_moving(measured, predicted)
+        }
+    }
+}
+
+/// The pixel as an obstacle, if it crosses the vehicle's window.
+fn candidate(
+    pair: &DensePair<'_>,
+    rigid: Option<&RigidPrediction<'_>>,
+    config: &Config,
+    blocks: &Blocks,
+    (u, v): (usize, usize),
+    velocity: &DepthVelocity,
+    dt_s: f64,
+) -> Option<Candidate> {
+    let impact = TimeToImpact { looming: velocity.looming(dt_s)? };
+    let seconds = impact.seconds()?;
+    let (x, y) = pair.rig.image_from_pixel(u as f64, v as f64);
+    let before = nalgebra::Vector3::new(x, y, pair.rig.focal_px) * (velocity.z_vz.mean.x / pair.rig.focal_px);
+    let later = rigid?.motion().apply(&before);
+    let crosses = config.window.is_crossed_by(&later, &((later - before) / dt_s), seconds);
+    crosses.then(|| Candidate { impact, block: blocks.index(x, y) })
+}
+
+/// The candidates for the nearest obstacle among tracks.
+pub fn track_candidates(
+    tracks: &[StereoTrack],
+    motion: &MotionEstimate,
+    rig: &crate::geometry::StereoRig,
+    config: &Config,
+    dt_s: f64,
+) -> Vec<Candidate> {
+    let Some(rigid) = RigidPrediction::new(&motion.theta, rig) else { return Vec::new() };
+    let blocks = Blocks::over(rig, 2.0 * config.block_px);
+    tracks
+        .iter()
+        .filter_map(|track| {
+            let xyd = &track.before.mean;
+            let measured = depth_velocity::dv_discrete(track, rig.depth_disparity_product());
+            let predicted = rigid.depth_velocity(xyd, track.before.sigma(2));
+            let velocity = rigid_unless_moving(Some(measured), predicted)?;
+            let impact = TimeToImpact { looming: velocity.looming(dt_s)? };
+            let before = rig.point(xyd)?;
+            let later = rigid.motion().apply(&before);
+            let crosses = config.window.is_crossed_by(&later, &((later - before) / dt_s), impact.seconds()?);
+            crosses.then(|| Candidate { impact, block: blocks.index(xyd.x, xyd.y) })
+        })
+        .collect()
+}
+
+fn fill<'a>(width: usize, height: usize, rows: impl Iterator<Item = &'a Vec<Option<Pixel>>>) -> MotionMaps {
+    let empty = || Field::missing(width, height);
+    let mut maps = MotionMaps {
+        depth_velocity: empty(),
+        depth_velocity_sigma: empty(),
+        impact: empty(),
+        impact_lo: empty(),
+        impact_hi: Grid::filled(width, height, f32::NAN),
+    };
+    for (v, row) in rows.enumerate() {
+        for (u, pixel) in row.iter().enumerate() {
+            let Some(pixel) = pixel else { continue };
+            let vz = pixel.velocity.vz();
+            maps.depth_velocity.set(u, v, Some(vz.value() as f32));
+            maps.depth_velocity_sigma.set(u, v, Some(vz.sigma(0) as f32));
+            let Some(impact) = pixel.impact else { continue };
+            if let (Some(seconds), Some((lo, hi))) = (impact.seconds(), impact.interval95_s()) {
+                maps.impact.set(u, v, Some(seconds as f32));
+                maps.impact_lo.set(u, v, Some(lo as f32));
+                maps.impact_hi.set(u, v, hi as f32);
+            }
+        }
+    }
+    maps
+}

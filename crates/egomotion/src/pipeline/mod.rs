@@ -1,0 +1,11 @@
+//! From frames to motion: the one place where all steps meet.
+
+pub mod config;
+pub mod maps;
+pub mod solve;
+pub mod stereo;
+pub mod trajectory;
+
+pub use config::{Approach, Config, ConfigError, EstimatorKind, Method, Observe};
+pub use stereo::{FrameMotion, StereoFrame, StereoMotion, Unanswered};
+pub use trajectory::Trajectory;

@@ -1,0 +1,170 @@
+//! One frame pair's observations to φ: the only place where the method is chosen.
+
+use super::config::{Approach, Config, EstimatorKind, Method};
+use crate::constrain::{binocular_flow, dcce, image_flow};
+use crate::estimate::alignment::{Fitting, Form, PointPair, align};
+use crate::estimate::least_squares::{Weighting, least_squares};
+use crate::estimate::lmeds::{LmedsOptions, lmeds};
+use crate::estimate::m_estimator::m_estimate;
+use crate::estimate::maximum_likelihood::{Measurement, maximum_likelihood};
+use crate::estimate::two_step::two_step;
+use crate::estimate::{Blocks, Fit, MotionEstimate, Row, Unsolvable};
+use crate::geometry::{StereoRig, Twist};
+use crate::observe::{DensePair, DepthChange, StereoFlow, StereoTrack};
+
+/// Where the observations of a frame pair come from.
+#[derive(Debug, Clone, Copy)]
+pub enum Observed<'a> {
+    /// Tracked corners.
+    Sparse(&'a [StereoTrack]),
+    /// Dense fields, of which every `sample_step_px`-th pixel is used.
+    Dense(DensePair<'a>),
+}
+
+/// φ by the configured method; rows and robust weights start from `start`.
+///
+/// # Errors
+/// [`Unsolvable`] when the observations do not determine a motion.
+pub fn solve(
+    observed: &Observed<'_>,
+    rig: &StereoRig,
+    start: &Twist,
+    config: &Config,
+) -> Result<MotionEstimate, Unsolvable> {
+    let solver = Solver { rig, start, config, blocks: Blocks::over(rig, config.block_px) };
+    match (config.method, config.approach) {
+        (Method::Ml, Approach::Discrete) => solver.likelihood(&solver.tracks(observed)),
+        (Method::Ml, Approach::Differential) => solver.likelihood(&solver.flows(observed)),
+        (Method::Dcce, _) => solver.depth_change(&solver.depth_changes(observed)),
+        (Method::Dv, _) => solver.binocular(&solver.flows(observed)),
+        (Method::Joint, _) => solver.joint(&solver.flows(observed)),
+        (Method::Rigid, _) => solver.alignment(&solver.tracks(observed), Form::Rigid),
+        (Method::Linear22, _) => solver.alignment(&solver.tracks(observed), Form::Affine),
+    }
+}
+
+struct Solver<'a> {
+    rig: &'a StereoRig,
+    start: &'a Twist,
+    config: &'a Config,
+    blocks: Blocks,
+}
+
+impl Solver<'_> {
+    fn tracks(&self, observed: &Observed<'_>) -> Vec<StereoTrack> {
+        match observed {
+            Observed::Sparse(tracks) => tracks.to_vec(),
+            Observed::Dense(pair) => pair.every(self.config.sample_step_px, DensePair::stereo_track),
+        }
+    }
+
+    fn flows(&self, observed: &Observed<'_>) -> Vec<StereoFlow> {
+        let discrete = self.config.approach == Approach::Discrete;
+        match observed {
+            Observed::Dense(pair) if !discrete => {
+                pair.every(self.config.sample_step_px, DensePair::stereo_flow)
+            }
+            _ if discrete => self.tracks(observed).iter().map(StereoTrack::discrete_flow).collect(),
+            _ => self.tracks(observed).iter().map(StereoTrack::midpoint_flow).collect(),
+        }
+    }
+
+    fn depth_changes(&self, observed: &Observed<'_>) -> Vec<DepthChange> {
+        let bf = self.rig.depth_disparity_product();
+        let step = self.config.sample_step_px;
+        match (observed, self.config.approach) {
+            (Observed::Sparse(_), _) => Vec::new(),
+            (Observed::Dense(pair), Approach::Discrete) => {
+                pair.every(step, |pair, u, v| Some(pair.depth_track(u, v)?.depth_change(bf)))
+            }
+            (Observed::Dense(pair), Approach::Differential) => {
+                pair.every(step, |pair, u, v| Some(pair.depth_flow(u, v)?.depth_change(bf)))
+            }
+        }
+    }
+
+    /// The configured estimator on rows whose scale is as printed.
+    fn fit<const N: usize>(&self, rows: &[Row<N>]) -> Result<Fit<N>, Unsolvable> {
+        match self.config.estimator {
+            EstimatorKind::Ls => least_squares(rows, Weighting::Unit),
+            EstimatorKind::Lmeds => lmeds(rows, Weighting::Unit, &self.lmeds()),
+            EstimatorKind::Irls => {
+                let start = least_squares(rows, Weighting::InverseVariance)?.theta;
+                m_estimate(rows, &start, &self.config.irls)
+            }
+        }
+    }
+
+    fn lmeds(&self) -> LmedsOptions {
+        LmedsOptions { seed: self.config.lmeds.seed ^ self.config.seed, ..self.config.lmeds }
+    }
+
+    fn likelihood<M: Measurement>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
+        let kernel = &self.config.maximum_likelihood.kernel;
+        let found = maximum_likelihood(observations, self.rig, self.start, Some(&self.blocks), kernel)?;
+        Ok(found.motion)
+    }
+
+    fn depth_change(&self, changes: &[DepthChange]) -> Result<MotionEstimate, Unsolvable> {
+        let rows: Vec<Row<6>> = changes
+            .iter()
+            .map(|change| {
+                let constraint = dcce::constraint(change, self.rig.focal_px, self.start);
+                Row::from_constraint(&constraint, self.blocks.index(change.x_px, change.y_px))
+            })
+            .collect();
+        Ok(self.fit(&rows)?.estimate(&rows))
+    }
+
+    fn flow_rows(&self, flows: &[StereoFlow]) -> Vec<Row<6>> {
+        flows
+            .iter()
+            .flat_map(|flow| {
+                let block = self.blocks.index(flow.x_px, flow.y_px);
+                image_flow::constraints(flow, self.rig, self.start).map(|c| Row::from_constraint(&c, block))
+            })
+            .collect()
+    }
+
+    fn binocular(&self, flows: &[StereoFlow]) -> Result<MotionEstimate, Unsolvable> {
+        let dv: Vec<Row<6>> = flows
+            .iter()
+            .map(|flow| {
+                let constraint = binocular_flow::constraint_as_printed(flow, self.rig, self.start);
+                Row::from_constraint(&constraint, self.blocks.index(flow.x_px, flow.y_px))
+            })
+            .collect();
+        two_step(&dv, &self.flow_rows(flows), |rows| self.fit(rows))
+    }
+
+    /// Rows in metres and in pixels only add up in units of their σ.
+    fn joint(&self, flows: &[StereoFlow]) -> Result<MotionEstimate, Unsolvable> {
+        let mut rows = self.flow_rows(flows);
+        rows.extend(flows.iter().map(|flow| {
+            let constraint = binocular_flow::constraint(flow, self.rig, self.start);
+            Row::from_constraint(&constraint, self.blocks.index(flow.x_px, flow.y_px))
+        }));
+        let fit = match self.config.estimator {
+            EstimatorKind::Ls => least_squares(&rows, Weighting::InverseVariance)?,
+            EstimatorKind::Lmeds => lmeds(&rows, Weighting::InverseVariance, &self.lmeds())?,
+            EstimatorKind::Irls => m_estimate(&rows, &self.start.vector(), &self.config.irls)?,
+        };
+        Ok(fit.estimate(&rows))
+    }
+
+    fn alignment(&self, tracks: &[StereoTrack], form: Form) -> Result<MotionEstimate, Unsolvable> {
+        let pairs: Vec<PointPair> = tracks
+            .iter()
+            .filter_map(|track| {
+                let block = self.blocks.index(track.before.mean.x, track.before.mean.y);
+                PointPair::from_track(track, self.rig, block)
+            })
+            .collect();
+        let fitting = match self.config.estimator {
+            EstimatorKind::Ls => Fitting::LeastSquares,
+            EstimatorKind::Lmeds => Fitting::Lmeds(self.lmeds()),
+            EstimatorKind::Irls => Fitting::MEstimator(self.config.irls),
+        };
+        align(&pairs, form, &fitting)
+    }
+}

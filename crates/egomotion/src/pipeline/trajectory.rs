@@ -1,0 +1,48 @@
+//! Poses from frame-to-frame motions; every frame gets one.
+
+use crate::geometry::RigidMotion;
+
+use super::stereo::FrameMotion;
+
+/// Camera poses world_from_camera, the first the identity, one for each frame.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Trajectory {
+    poses: Vec<RigidMotion>,
+    times_s: Vec<f64>,
+}
+
+impl Trajectory {
+    /// No poses yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Append the next frame.
+    ///
+    /// Without an answer the camera is taken to stand still, until a later frame bridges the gap: then
+    /// the poses between are interpolated in time at constant φ.
+    pub fn push(&mut self, answer: &FrameMotion) {
+        let last = self.poses.last().copied().unwrap_or_else(RigidMotion::identity);
+        self.poses.push(last);
+        self.times_s.push(answer.time_s);
+        let (Ok(motion), Some(reference), Some(dt)) = (&answer.motion, answer.reference, answer.dt_s) else {
+            return;
+        };
+        let (start, start_s) = (self.poses[reference], self.times_s[reference]);
+        for k in reference + 1..self.poses.len() {
+            let share = (self.times_s[k] - start_s) / dt;
+            // The scene moves by exp(φ), so the camera by its inverse.
+            self.poses[k] = start.after(&motion.phi().scaled(share).exp().inverse());
+        }
+    }
+
+    /// The poses world_from_camera.
+    pub fn poses(&self) -> &[RigidMotion] {
+        &self.poses
+    }
+
+    /// The times, in seconds.
+    pub fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+}
