@@ -248,4 +248,18 @@ mod tests {
         assert!(scene.sees(&Vector3::new(-1.5, 0.0, 0.0), &behind));
         assert!((scene.clearance_m(&Vector3::zeros()) - 0.9).abs() < 1e-12);
     }
+
+    #[test]
+    fn tiles_alternate_and_fade_where_pixels_are_coarse() {
+        let at = |x: f64, z: f64, width: f64| {
+            let (point, normal) = (Vector3::new(x, 0.7, z), Vector3::new(0.0, -1.0, 0.0));
+            let steps = [Vector3::new(width, 0.0, 0.0), Vector3::new(0.0, 0.0, width)];
+            tiles(0.4, &Hit { s: 1.0, point, normal, surface: 0 }, &steps[0], &steps[1])
+        };
+        let bright = 0.5 * TILE_CONTRAST;
+        assert!((at(0.2, 0.2, 0.01) - bright).abs() < 1e-12 && (at(0.6, 0.2, 0.01) + bright).abs() < 1e-12);
+        assert!((at(-0.2, 0.2, 0.01) + bright).abs() < 1e-12 && (at(0.6, -0.2, 0.01) - bright).abs() < 1e-12);
+        // On a border, half of each; over whole periods, nothing.
+        assert!(at(0.4, 0.2, 0.1).abs() < 1e-12 && at(0.2, 0.2, 1.6).abs() < 1e-12);
+    }
 }
