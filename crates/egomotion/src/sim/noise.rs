@@ -67,7 +67,7 @@ impl SensorNoise {
     fn camera(&self, image: &Image, frame: u64, right: bool) -> Image {
         let (gain, offset) = if right { (self.right_gain, self.right_offset) } else { (1.0, 0.0) };
         // Streams apart: the golden ratio spreads frames, the generator's own mixing does the rest.
-        let stream = (2 * frame + u64::from(right)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let stream = frame.wrapping_mul(2).wrapping_add(u64::from(right)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let mut rng = Pcg64Mcg::seed_from_u64(self.seed ^ stream);
         let mut exposed = image.clone();
         for grey in exposed.values_mut() {

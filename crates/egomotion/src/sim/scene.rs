@@ -7,20 +7,32 @@ use super::texture::Texture;
 
 /// Number of surface ids that a part takes: a box has six faces.
 const FACES: u16 = 6;
-/// Standard deviation of a surface's grey level, as a share of its mean.
-const CONTRAST: f64 = 0.38;
 /// Where the texture saturates, in its standard deviations: keeps every grey level above zero.
 const SATURATION: f64 = 2.4;
 /// Light that reaches every surface, whatever its direction, as a share of full light.
 const AMBIENT: f64 = 0.5;
+/// Difference between neighbouring tiles, as a share of their mean.
+const TILE_CONTRAST: f64 = 0.3;
+/// A part's shade reaches this many of its radii.
+const SHADE_REACH: f64 = 5.0;
 
 /// One part of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
     /// Its shape, in the world's frame.
     pub shape: Shape,
-    /// Mean grey level in full light, 0 … 130 keeps the brightest spots within 8 bits.
+    /// Mean grey level in full light; up to 150 keeps nearly every spot within 8 bits.
     pub grey: f64,
+    /// Side of the dark and bright tiles laid in it along the world's axes, in metres; 0 for none.
+    pub tile_m: f64,
+}
+
+/// A ball around a part, or one that shades like it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ball {
+    part: u16,
+    centre: Vector3<f64>,
+    radius_m: f64,
 }
 
 /// What a ray sees.
@@ -42,29 +54,39 @@ pub struct Hit {
 pub struct Scene {
     parts: Vec<Part>,
     texture: Texture,
+    contrast: f64,
     lamp_m: Vector3<f64>,
+    shades: Vec<Ball>,
 }
 
 impl Scene {
-    /// A scene of at most 10 000 parts (further ones are dropped), a texture from `seed`, a lamp at `lamp_m`.
-    pub fn new(mut parts: Vec<Part>, lamp_m: Vector3<f64>, seed: u64) -> Self {
+    /// A scene of at most 10 000 parts (further ones are dropped), lit by a lamp at `lamp_m`.
+    ///
+    /// Every surface carries the texture of `seed`; `contrast` is the standard deviation of its grey level
+    /// as a share of the mean, below 0.4 so that it never reaches black.
+    pub fn new(mut parts: Vec<Part>, lamp_m: Vector3<f64>, contrast: f64, seed: u64) -> Self {
         parts.truncate(10_000);
-        Self { parts, texture: Texture::new(seed), lamp_m }
+        let shade = |(part, id): (&Part, u16)| {
+            part.shape.shade_ball().map(|(centre, radius_m)| Ball { part: id, centre, radius_m })
+        };
+        let shades = parts.iter().zip(0..).filter_map(shade).collect();
+        Self { parts, texture: Texture::new(seed), contrast, lamp_m, shades }
     }
 
     /// The room of section 7.1: ground, front wall, two side walls, a sphere and a turned box.
     pub fn paper_room() -> Self {
         let parts = [
-            (Shape::plane([0.0, -1.0, 0.0], -0.9), 100.0),
-            (Shape::plane([0.0, 0.0, -1.0], -6.0), 126.0),
-            (Shape::plane([1.0, 0.0, 0.0], -1.7), 116.0),
-            (Shape::plane([-1.0, 0.0, 0.0], -1.7), 112.0),
-            (Shape::sphere([-0.35, 0.30, 2.1], 0.40), 130.0),
-            (Shape::turned_box([0.55, 0.55, 3.2], [0.35, 0.35, 0.30], 30.0), 80.0),
+            (Shape::plane([0.0, -1.0, 0.0], -0.9), 135.0),
+            (Shape::plane([0.0, 0.0, -1.0], -6.0), 178.0),
+            (Shape::plane([1.0, 0.0, 0.0], -1.7), 160.0),
+            (Shape::plane([-1.0, 0.0, 0.0], -1.7), 152.0),
+            (Shape::sphere([-0.35, 0.30, 2.1], 0.40), 185.0),
+            (Shape::turned_box([0.55, 0.55, 3.2], [0.35, 0.35, 0.30], 30.0), 105.0),
         ];
         Self::new(
-            parts.map(|(shape, grey)| Part { shape, grey }).to_vec(),
+            parts.map(|(shape, grey)| Part { shape, grey, tile_m: 0.0 }).to_vec(),
             Vector3::new(-0.6, -2.0, 0.8),
+            0.3,
             2003,
         )
     }
@@ -73,31 +95,36 @@ impl Scene {
     pub fn demo_room() -> Self {
         let parts = [
             // Floor, ceiling, front, back, left and right wall.
-            (Shape::plane([0.0, -1.0, 0.0], -0.7), 92.0),
-            (Shape::plane([0.0, 1.0, 0.0], -1.7), 130.0),
-            (Shape::plane([0.0, 0.0, -1.0], -6.5), 128.0),
-            (Shape::plane([0.0, 0.0, 1.0], -2.0), 110.0),
-            (Shape::plane([1.0, 0.0, 0.0], -2.4), 122.0),
-            (Shape::plane([-1.0, 0.0, 0.0], -2.6), 112.0),
+            (Shape::plane([0.0, -1.0, 0.0], -0.7), 128.0, 0.4),
+            (Shape::plane([0.0, 1.0, 0.0], -1.7), 175.0, 0.0),
+            (Shape::plane([0.0, 0.0, -1.0], -6.5), 190.0, 0.0),
+            (Shape::plane([0.0, 0.0, 1.0], -2.0), 150.0, 0.0),
+            (Shape::plane([1.0, 0.0, 0.0], -2.4), 172.0, 0.0),
+            (Shape::plane([-1.0, 0.0, 0.0], -2.6), 156.0, 0.0),
             // The obstacle, with a ball on it.
-            (Shape::turned_box([0.10, 0.35, 3.05], [0.38, 0.35, 0.28], 14.0), 66.0),
-            (Shape::sphere([0.16, -0.17, 3.02], 0.17), 130.0),
+            (Shape::turned_box([0.10, 0.35, 3.05], [0.38, 0.35, 0.28], 14.0), 100.0, 0.0),
+            (Shape::sphere([0.16, -0.17, 3.02], 0.17), 215.0, 0.0),
             // Left: a ball, a low crate, a pillar, a cupboard.
-            (Shape::sphere([-1.15, 0.33, 3.7], 0.37), 104.0),
-            (Shape::turned_box([-0.98, 0.54, 2.5], [0.26, 0.16, 0.20], 38.0), 124.0),
-            (Shape::turned_box([-1.30, -0.50, 5.2], [0.20, 1.20, 0.20], 20.0), 84.0),
-            (Shape::turned_box([-2.15, -0.05, 3.6], [0.25, 0.75, 0.55], 0.0), 72.0),
+            (Shape::sphere([-1.15, 0.33, 3.9], 0.37), 150.0, 0.0),
+            (Shape::turned_box([-1.02, 0.54, 2.95], [0.26, 0.16, 0.20], 38.0), 185.0, 0.0),
+            (Shape::turned_box([-1.30, -0.50, 5.2], [0.20, 1.20, 0.20], 20.0), 115.0, 0.3),
+            (Shape::turned_box([-2.15, -0.05, 3.6], [0.25, 0.75, 0.55], 0.0), 104.0, 0.0),
             // Right: two crates on each other, a shelf, a lamp's globe.
-            (Shape::turned_box([1.35, 0.30, 4.1], [0.42, 0.40, 0.40], -25.0), 110.0),
-            (Shape::turned_box([1.30, -0.34, 4.15], [0.26, 0.24, 0.26], 18.0), 62.0),
-            (Shape::turned_box([2.30, -0.10, 2.9], [0.30, 0.80, 0.50], 0.0), 128.0),
-            (Shape::sphere([0.75, -1.05, 4.6], 0.22), 130.0),
+            (Shape::turned_box([1.35, 0.30, 4.1], [0.42, 0.40, 0.40], -25.0), 160.0, 0.0),
+            (Shape::turned_box([1.30, -0.34, 4.15], [0.26, 0.24, 0.26], 18.0), 94.0, 0.0),
+            (Shape::turned_box([2.30, -0.10, 3.1], [0.30, 0.80, 0.50], 0.0), 185.0, 0.0),
+            (Shape::sphere([0.75, -1.05, 4.6], 0.22), 205.0, 0.0),
             // Behind: a table, and pictures on the wall.
-            (Shape::turned_box([0.15, 0.10, 5.7], [0.75, 0.60, 0.35], -6.0), 96.0),
-            (Shape::quad([-0.35, -0.85, 6.48], [0.50, 0.0, 0.0], [0.0, 0.35, 0.0]), 64.0),
-            (Shape::quad([1.75, -0.70, 6.48], [0.35, 0.0, 0.0], [0.0, 0.48, 0.0]), 84.0),
+            (Shape::turned_box([0.15, 0.10, 5.7], [0.75, 0.60, 0.35], -6.0), 104.0, 0.0),
+            (Shape::quad([-0.35, -0.95, 6.48], [0.50, 0.0, 0.0], [0.0, 0.35, 0.0]), 80.0, 0.0),
+            (Shape::quad([1.75, -0.75, 6.48], [0.35, 0.0, 0.0], [0.0, 0.48, 0.0]), 105.0, 0.12),
         ];
-        Self::new(parts.map(|(shape, grey)| Part { shape, grey }).to_vec(), Vector3::new(0.3, -1.5, 1.6), 42)
+        Self::new(
+            parts.map(|(shape, grey, tile_m)| Part { shape, grey, tile_m }).to_vec(),
+            Vector3::new(0.3, -1.5, 1.6),
+            0.26,
+            42,
+        )
     }
 
     /// The parts, in the order of their surface ids.
@@ -145,7 +172,8 @@ impl Scene {
             Vector3::new((place * 0.618).fract(), (place * 0.755).fract(), (place * 0.570).fract()) * 4.0;
         let n = self.texture.value(&(hit.point + cut), du, dv);
         let n = n / (1.0 + n * n / (SATURATION * SATURATION)).sqrt();
-        (part.grey * self.light(id, hit) * (1.0 + CONTRAST * n)).clamp(0.0, 255.0)
+        let tile = 1.0 + tiles(part.tile_m, hit, du, dv);
+        (part.grey * tile * self.light(id, hit) * (1.0 + self.contrast * n)).clamp(0.0, 255.0)
     }
 
     /// Share of full light at a hit: ambient light, the lamp, and the soft shade of the parts nearby.
@@ -153,18 +181,35 @@ impl Scene {
         let to_lamp = self.lamp_m - hit.point;
         let range_squared = to_lamp.norm_squared();
         let slant = (hit.normal.dot(&to_lamp) / range_squared.sqrt()).max(0.0);
-        let lamp = (1.0 - AMBIENT) * (0.25 + 0.75 * slant) / (1.0 + 0.02 * range_squared);
-        let open = |(part, other): (&Part, u16)| match part.shape.shade_ball().filter(|_| other != id) {
-            // Share of the half space that a ball hides from the surface.
-            Some((centre, radius)) => {
-                let to = centre - hit.point;
-                let d2 = to.norm_squared().max(radius * radius);
-                1.0 - 0.75 * (hit.normal.dot(&to) / d2.sqrt()).clamp(0.0, 1.0) * radius * radius / d2
+        let lamp = (1.0 - AMBIENT) * (0.3 + 0.7 * slant) / (1.0 + 0.01 * range_squared);
+        let open = |ball: &Ball| {
+            // Share of the half space that the ball leaves open, with a tail that ends.
+            let (to, r2) = (ball.centre - hit.point, ball.radius_m * ball.radius_m);
+            let d2 = to.norm_squared().max(r2);
+            if ball.part == id || d2 > SHADE_REACH * SHADE_REACH * r2 {
+                return 1.0;
             }
-            None => 1.0,
+            let hidden = r2 / d2 - 1.0 / (SHADE_REACH * SHADE_REACH);
+            1.0 - 0.75 * (hit.normal.dot(&to) / d2.sqrt()).clamp(0.0, 1.0) * hidden
         };
-        (AMBIENT + lamp) * self.parts.iter().zip(0..).map(open).product::<f64>()
+        (AMBIENT + lamp) * self.shades.iter().map(open).product::<f64>()
     }
+}
+
+/// Brightness of a solid chequer at a hit, in ±½ [`TILE_CONTRAST`], averaged over the pixel's extent along
+/// each axis; the axis nearest to the normal does not count, so that no face lies on a border.
+fn tiles(side_m: f64, hit: &Hit, du: &Vector3<f64>, dv: &Vector3<f64>) -> f64 {
+    if side_m <= 0.0 {
+        return 0.0;
+    }
+    // Integral of the square wave of period 2.
+    let wave = |x: f64| 2.0 * (0.5 * x - (0.5 * x).floor() - 0.5).abs();
+    let mut sign = 0.5 * TILE_CONTRAST;
+    for axis in (0..3).filter(|&axis| axis != hit.normal.iamax()) {
+        let (x, width) = (hit.point[axis] / side_m, (du[axis].abs() + dv[axis].abs()) / side_m);
+        sign *= (wave(x - 0.5 * width) - wave(x + 0.5 * width)) / width.max(1e-9);
+    }
+    sign
 }
 
 #[cfg(test)]
@@ -202,5 +247,19 @@ mod tests {
         assert!(!scene.sees(&Vector3::zeros(), &behind));
         assert!(scene.sees(&Vector3::new(-1.5, 0.0, 0.0), &behind));
         assert!((scene.clearance_m(&Vector3::zeros()) - 0.9).abs() < 1e-12);
+    }
+
+    #[test]
+    fn tiles_alternate_and_fade_where_pixels_are_coarse() {
+        let at = |x: f64, z: f64, width: f64| {
+            let (point, normal) = (Vector3::new(x, 0.7, z), Vector3::new(0.0, -1.0, 0.0));
+            let steps = [Vector3::new(width, 0.0, 0.0), Vector3::new(0.0, 0.0, width)];
+            tiles(0.4, &Hit { s: 1.0, point, normal, surface: 0 }, &steps[0], &steps[1])
+        };
+        let bright = 0.5 * TILE_CONTRAST;
+        assert!((at(0.2, 0.2, 0.01) - bright).abs() < 1e-12 && (at(0.6, 0.2, 0.01) + bright).abs() < 1e-12);
+        assert!((at(-0.2, 0.2, 0.01) + bright).abs() < 1e-12 && (at(0.6, -0.2, 0.01) - bright).abs() < 1e-12);
+        // On a border, half of each; over whole periods, nothing.
+        assert!(at(0.4, 0.2, 0.1).abs() < 1e-12 && at(0.2, 0.2, 1.6).abs() < 1e-12);
     }
 }

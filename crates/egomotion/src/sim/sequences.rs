@@ -48,7 +48,8 @@ impl Sequence {
     ///
     /// `size_px`, the image's (width, height), scales the focal length with the width; `None` is the
     /// sequence's own size, 320×240 for the paper's and 640×480 for `demo`. `frames` `None` is the
-    /// sequence's own number; `demo` has at most 24. `step` multiplies every motion.
+    /// sequence's own number; `demo` has at most 24. `step` multiplies every motion. A long or fast drive
+    /// leaves the room: [`Sequence::clearance_m`] tells.
     pub fn named(
         name: &str,
         size_px: Option<(usize, usize)>,
@@ -202,12 +203,10 @@ mod tests {
                 "{k} {phi:?}"
             );
         }
-        // The obstacle is what the robot faces, first and last, and what it approaches.
-        let ahead = |k| {
-            let view = sequence.view(k).unwrap();
-            view.truth_at(sequence.rig.cx_px + 40.0, sequence.rig.cy_px + 130.0).unwrap()
-        };
+        // It starts and ends with its obstacle, the seventh part, ahead, and has come more than 1 m nearer.
+        let ahead = |k| sequence.view(k).unwrap().truth_at(sequence.rig.cx_px + 13.0, 290.0).unwrap();
         let (first, last) = (ahead(0), ahead(sequence.frames() - 1));
-        assert!(first.depth_m() > 1.0 && last.depth_m() > 1.0);
+        assert_eq!((first.surface / 6, last.surface / 6), (6, 6));
+        assert!(first.depth_m() - last.depth_m() > 1.0 && last.depth_m() > 1.0, "{first:?} {last:?}");
     }
 }

@@ -76,19 +76,21 @@ impl Shape {
         match self {
             Self::Plane { normal, offset_m } => meet_plane(normal, *offset_m, origin, direction),
             Self::Quad { centre, half_m: [a, b] } => {
-                let normal = a.cross(b).normalize();
+                let normal = a.cross(b);
                 let m = meet_plane(&normal, normal.dot(centre), origin, direction)?;
                 let p = origin + m.s * direction - centre;
                 let inside = |e: &Vector3<f64>| p.dot(e).abs() <= e.norm_squared();
-                (inside(a) && inside(b)).then_some(m)
+                (inside(a) && inside(b)).then(|| Meeting { normal: m.normal.normalize(), ..m })
             }
             Self::Sphere { centre, radius_m } => meet_sphere(centre, *radius_m, origin, direction),
             Self::Box { centre, half_m, world_from_box } => {
-                let m = meet_slabs(
-                    half_m,
-                    &world_from_box.tr_mul(&(origin - centre)),
-                    &world_from_box.tr_mul(direction),
-                )?;
+                // Most rays miss the ball around the box, which is quickly seen.
+                let from = origin - centre;
+                let (outside, along) = (from.norm_squared() - half_m.norm_squared(), from.dot(direction));
+                if outside > 0.0 && (along > 0.0 || along * along < outside * direction.norm_squared()) {
+                    return None;
+                }
+                let m = meet_slabs(half_m, &world_from_box.tr_mul(&from), &world_from_box.tr_mul(direction))?;
                 Some(Meeting { normal: world_from_box * m.normal, ..m })
             }
         }
@@ -170,7 +172,7 @@ fn meet_slabs(half: &Vector3<f64>, origin: &Vector3<f64>, direction: &Vector3<f6
             return None;
         }
     }
-    if enter.0 > leave.0 || leave.0 <= 0.0 {
+    if enter.0 > leave.0 || leave.0 <= 0.0 || leave.0.is_infinite() {
         return None;
     }
     let outside = enter.0 > 0.0;

@@ -14,6 +14,8 @@ pub const LONGEST_M: f64 = 0.9;
 
 /// Standard deviation of the pixel's Gaussian aperture (optics and sensor area together), in pixels.
 const APERTURE_PX: f64 = 0.5;
+/// Amplitude grows with this power of the wavelength: 1.5 times from the shortest to the longest.
+const TILT: f64 = 0.1;
 const LANES: usize = 8;
 const BLOCKS: usize = 16;
 
@@ -24,9 +26,10 @@ struct Waves {
     k: [[f32; LANES]; 3],
     /// Phase at the origin, in cycles.
     phase: [f32; LANES],
+    amplitude: [f32; LANES],
 }
 
-/// A seeded sum of 128 plane waves: zero mean, unit variance, equal energy in every octave.
+/// A seeded sum of 128 plane waves: zero mean, unit variance, every octave well present.
 ///
 /// A function of the point alone, so it has no seams and looks the same from everywhere. A plane wave
 /// seen through a Gaussian aperture is the same wave with a smaller amplitude; so each pixel shows the
@@ -40,8 +43,9 @@ impl Texture {
     /// Waves of random directions and phases; wavelengths log-uniform from [`SHORTEST_M`] to [`LONGEST_M`].
     pub fn new(seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        let mut waves = vec![Waves { k: [[0.0; LANES]; 3], phase: [0.0; LANES] }; BLOCKS];
-        let mut place = 0.0;
+        let mut waves =
+            vec![Waves { k: [[0.0; LANES]; 3], phase: [0.0; LANES], amplitude: [0.0; LANES] }; BLOCKS];
+        let (mut place, mut variance) = (0.0, 0.0);
         for block in &mut waves {
             for lane in 0..LANES {
                 // Stratified, so that no octave is left empty by chance.
@@ -52,9 +56,14 @@ impl Texture {
                     k[lane] = (c / wavelength) as f32;
                 }
                 block.phase[lane] = rng.random();
+                let amplitude = wavelength.powf(TILT);
+                block.amplitude[lane] = amplitude as f32;
+                variance += 0.5 * amplitude * amplitude;
                 place += 1.0;
             }
         }
+        let unit = (1.0 / variance.sqrt()) as f32;
+        waves.iter_mut().flat_map(|block| &mut block.amplitude).for_each(|a| *a *= unit);
         Self { waves }
     }
 
@@ -65,8 +74,7 @@ impl Texture {
         for block in &self.waves {
             block.add(&p, &du, &dv, &mut sums);
         }
-        let variance = 0.5 * (BLOCKS * LANES) as f64;
-        sums.iter().map(|&s| f64::from(s)).sum::<f64>() / variance.sqrt()
+        sums.iter().map(|&s| f64::from(s)).sum()
     }
 }
 
@@ -81,7 +89,7 @@ impl Waves {
             let b = x * dv[0] + y * dv[1] + z * dv[2];
             let w = (1.0 - Q * (a * a + b * b)).max(0.0);
             let w = w * w;
-            *sum += w * w * cosine(x * p[0] + y * p[1] + z * p[2] + self.phase[lane]);
+            *sum += self.amplitude[lane] * w * w * cosine(x * p[0] + y * p[1] + z * p[2] + self.phase[lane]);
         }
     }
 }
@@ -94,7 +102,8 @@ fn cosine(cycles: f32) -> f32 {
     let r = cycles - ((cycles + ROUND) - ROUND);
     let x = std::f32::consts::TAU * (0.25 - r.abs());
     let s = x * x;
-    x * (1.0 - s / 6.0 * (1.0 - s * (1.0 / 20.0) * (1.0 - s * (1.0 / 42.0) * (1.0 - s * (1.0 / 72.0)))))
+    x * (1.0
+        - s * (1.0 / 6.0) * (1.0 - s * (1.0 / 20.0) * (1.0 - s * (1.0 / 42.0) * (1.0 - s * (1.0 / 72.0)))))
 }
 
 #[cfg(test)]
