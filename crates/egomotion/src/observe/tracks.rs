@@ -13,7 +13,7 @@ use super::corners::{Corner, corners};
 use super::observation::StereoTrack;
 use super::patch::{Freedom, Located, Patch};
 use super::pyramid::{Gradients, Pyramid, gradients};
-use crate::geometry::{Field, Gaussian, Image, StereoRig, Twist};
+use crate::geometry::{Field, Gaussian, Grid, Image, StereoRig, Twist};
 
 /// How corners are found and followed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -76,6 +76,8 @@ pub struct Hints<'a> {
     pub shift: Option<&'a Field>,
     /// Expected scene motion, left camera.
     pub motion: Option<&'a Twist>,
+    /// Pixels never to use, where `true`.
+    pub mask: Option<&'a Grid<bool>>,
 }
 
 /// Corners of `before` followed to `after`, as tracks with covariances; the order is fixed.
@@ -88,7 +90,10 @@ pub fn stereo_tracks(
 ) -> Vec<StereoTrack> {
     let (width, height) = before.left.size();
     let cell = ((width * height) as f64 / options.corners.max(1) as f64).sqrt().max(4.0) as usize;
-    let found = corners(&before.gradients, cell, super::patch::RADIUS + 3, options.least_strength);
+    let mut found = corners(&before.gradients, cell, super::patch::RADIUS + 3, options.least_strength);
+    if let Some(mask) = hints.mask {
+        found.retain(|c| c.u < mask.width() && c.v < mask.height() && !mask.at(c.u, c.v));
+    }
     let follow = Follower { before, after, rig, hints, options };
     let traced: Vec<Trace> = found.par_iter().filter_map(|corner| follow.trace(corner)).collect();
     let noise = grey_noise(&traced);

@@ -9,7 +9,7 @@ use super::maps::{MotionMaps, motion_maps, track_candidates};
 use super::solve::{Observed, solve};
 use crate::estimate::maximum_likelihood::{maximum_likelihood, robust_start};
 use crate::estimate::{Blocks, MotionEstimate, Unsolvable};
-use crate::geometry::{Field, Image, RigError, RigidMotion, StereoRig, Twist};
+use crate::geometry::{Field, Grid, Image, RigError, RigidMotion, StereoRig, Twist};
 use crate::motion::TimeToImpact;
 use crate::motion::impact::nearest;
 use crate::observe::tracks::{Hints, stereo_tracks};
@@ -132,6 +132,7 @@ pub struct StereoMotion {
     rig: StereoRig,
     config: Config,
     matcher: DisparityMatcher,
+    mask: Option<Grid<bool>>,
     frames: usize,
     last_time_s: Option<f64>,
     reference: Option<Reference>,
@@ -168,6 +169,7 @@ impl StereoMotion {
             rig,
             matcher: DisparityMatcher::new(config.disparity.clone()),
             config,
+            mask: None,
             frames: 0,
             last_time_s: None,
             reference: None,
@@ -179,6 +181,16 @@ impl StereoMotion {
     /// The rig.
     pub fn rig(&self) -> &StereoRig {
         &self.rig
+    }
+
+    /// Pixels of the left image that are never used (a bonnet, a rotor), where `true`.
+    pub fn set_mask(&mut self, mask: Option<Grid<bool>>) {
+        self.mask = mask;
+    }
+
+    /// The frame that the next one will be matched with.
+    pub fn reference(&self) -> Option<usize> {
+        self.reference.as_ref().map(|reference| reference.frame)
     }
 
     /// Account for a frame that could not be read: it gets a row, and the next frame bridges it.
@@ -210,7 +222,11 @@ impl StereoMotion {
         let disparity = (self.config.observe == Observe::Dense).then(|| {
             timed(&mut stages.disparity_ms, || {
                 let (left, right) = (&images.left.levels()[0], &images.right.levels()[0]);
-                self.matcher.compute(left, right).ok()
+                let mut map = self.matcher.compute(left, right).ok()?;
+                if let Some(mask) = &self.mask {
+                    erase(&mut map.shift, mask);
+                }
+                Some(map)
             })
         });
         let here =
@@ -220,7 +236,8 @@ impl StereoMotion {
             self.reference = Some(here);
             return first;
         };
-        let pair = FramePair { before: &before, after: &here, rig: &self.rig, config: &self.config };
+        let mask = self.mask.as_ref();
+        let pair = FramePair { before: &before, after: &here, rig: &self.rig, config: &self.config, mask };
         let result = pair.motion(self.velocity.as_ref(), &mut stages);
         let answer = FrameMotion {
             frame: self.frames,
@@ -288,12 +305,24 @@ fn contrast(image: &Image) -> f64 {
     (image.values().iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / n).sqrt()
 }
 
+/// Clear the pixels that the mask excludes.
+fn erase(field: &mut Field, mask: &Grid<bool>) {
+    for v in 0..field.height().min(mask.height()) {
+        for (value, &masked) in field.row_mut(v).iter_mut().zip(mask.row(v)) {
+            if masked {
+                *value = f32::NAN;
+            }
+        }
+    }
+}
+
 /// Two frames to be compared.
 struct FramePair<'a> {
     before: &'a Reference,
     after: &'a Reference,
     rig: &'a StereoRig,
     config: &'a Config,
+    mask: Option<&'a Grid<bool>>,
 }
 
 struct PairResult {
@@ -338,7 +367,7 @@ impl FramePair<'_> {
 
     fn track(&self, motion: Option<&Twist>) -> Vec<StereoTrack> {
         let shift = self.before.disparity.as_ref().map(|d| &d.shift);
-        let hints = Hints { shift, motion };
+        let hints = Hints { shift, motion, mask: self.mask };
         stereo_tracks(&self.before.images, &self.after.images, self.rig, hints, &self.config.tracks)
     }
 

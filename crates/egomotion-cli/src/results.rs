@@ -1,0 +1,155 @@
+//! The files of a run; each appears whole or not at all.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use egomotion::pipeline::stereo::DenseResults;
+use egomotion_io::trajectory::{Pose, write_kitti, write_tum};
+use egomotion_io::{flo, pfm, write};
+use serde::Serialize;
+
+use crate::session::{Outcome, Row};
+
+/// A folder that results go to.
+pub struct ResultFolder {
+    path: PathBuf,
+}
+
+/// The folders of maps.
+const MAPS: [&str; 8] = [
+    "disparity",
+    "disparity_sigma",
+    "flow",
+    "depth_velocity",
+    "depth_velocity_sigma",
+    "impact",
+    "impact_lo",
+    "impact_hi",
+];
+
+impl ResultFolder {
+    /// Make the folder, and those of the maps if they will be written.
+    pub fn create(path: &Path, maps: bool) -> Result<Self> {
+        write::folder(path)?;
+        // Find out now, not after an hour, that nothing can be written here.
+        let probe = path.join(".egomotion-writable");
+        write::bytes(&probe, b"")?;
+        let _ = std::fs::remove_file(&probe);
+        if maps {
+            for name in MAPS {
+                write::folder(&path.join(name))?;
+            }
+        }
+        Ok(Self { path: path.to_owned() })
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Write one file.
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<()> {
+        Ok(write::bytes(&self.path.join(name), content)?)
+    }
+
+    /// Write a value as JSON.
+    pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<()> {
+        let mut text = serde_json::to_string_pretty(value).context("cannot put the summary into JSON")?;
+        text.push('\n');
+        self.write(name, text.as_bytes())
+    }
+
+    /// Write the maps of the frame pair whose earlier frame has `index` in the source.
+    pub fn write_maps(&self, index: usize, dense: &DenseResults) -> Result<()> {
+        let file =
+            |folder: &str, extension: &str| self.path.join(folder).join(format!("{index:06}.{extension}"));
+        let motion = &dense.motion;
+        for (folder, map) in [
+            ("disparity", dense.disparity.shift.grid()),
+            ("disparity_sigma", dense.disparity.sigma.grid()),
+            ("depth_velocity", motion.depth_velocity.grid()),
+            ("depth_velocity_sigma", motion.depth_velocity_sigma.grid()),
+            ("impact", motion.impact.grid()),
+            ("impact_lo", motion.impact_lo.grid()),
+            ("impact_hi", &motion.impact_hi),
+        ] {
+            pfm::write(&file(folder, "pfm"), map)?;
+        }
+        flo::write(&file("flow", "flo"), &[dense.flow.u.clone(), dense.flow.v.clone()])?;
+        Ok(())
+    }
+
+    /// Write the trajectory in both formats and `motion.csv`.
+    pub fn write_motion(&self, outcome: &Outcome) -> Result<()> {
+        let times = outcome.trajectory.times_s();
+        let poses: Vec<Pose> = outcome
+            .trajectory
+            .poses()
+            .iter()
+            .zip(times)
+            .map(|(pose, &time_s)| Pose { time_s: Some(time_s), world_from_camera: *pose })
+            .collect();
+        write_tum(&self.path.join("trajectory_tum.txt"), &poses)?;
+        write_kitti(&self.path.join("trajectory_kitti.txt"), &poses)?;
+        self.write("motion.csv", motion_table(&outcome.rows)?.as_bytes())
+    }
+}
+
+/// `motion.csv`: one row for each frame from the second on.
+fn motion_table(rows: &[Row]) -> Result<String> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    let mut head: Vec<String> =
+        ["frame", "time_s", "dt_s", "tx", "ty", "tz", "wx", "wy", "wz"].map(String::from).to_vec();
+    head.extend(upper_triangle().map(|(i, j)| format!("cov_{i}{j}")));
+    head.extend(
+        ["rows", "inliers", "observed", "impact_s", "impact_lo_s", "impact_hi_s", "status"].map(String::from),
+    );
+    table.write_record(&head)?;
+    for row in rows.iter().skip(1) {
+        table.write_record(motion_record(row))?;
+    }
+    let bytes = table.into_inner().map_err(|e| e.into_error())?;
+    Ok(String::from_utf8(bytes)?)
+}
+
+fn upper_triangle() -> impl Iterator<Item = (usize, usize)> {
+    (0..6).flat_map(|i| (i..6).map(move |j| (i, j)))
+}
+
+fn motion_record(row: &Row) -> Vec<String> {
+    let motion = &row.motion;
+    let number = |v: f64| format!("{v:?}");
+    let mut record = vec![row.index.to_string(), number(motion.time_s)];
+    record.push(motion.dt_s.map_or(String::new(), number));
+    match &motion.motion {
+        Ok(estimate) => {
+            let shown = |i: usize, v: f64| if estimate.observed[i] { number(v) } else { String::new() };
+            record.extend((0..6).map(|i| shown(i, estimate.theta.mean[i])));
+            record.extend(upper_triangle().map(|(i, j)| number(estimate.theta.cov[(i, j)])));
+            record.extend([estimate.rows.to_string(), estimate.inliers.to_string()]);
+            let mut observed = String::new();
+            for o in estimate.observed {
+                let _ = write!(observed, "{}", u8::from(o));
+            }
+            record.push(observed);
+        }
+        Err(_) => record.extend(std::iter::repeat_n(String::new(), 6 + 21 + 3)),
+    }
+    let interval = motion.impact.and_then(|impact| Some((impact.seconds()?, impact.interval95_s()?)));
+    match interval {
+        Some((seconds, (lo, hi))) => record.extend([seconds, lo, hi].map(number)),
+        None => record.extend(std::iter::repeat_n(String::new(), 3)),
+    }
+    record.push(status(row).to_owned());
+    record
+}
+
+/// `ok`, `partial`, or why there is no answer.
+pub fn status(row: &Row) -> &'static str {
+    match &row.motion.motion {
+        Ok(estimate) if estimate.is_complete() => "ok",
+        Ok(_) => "partial",
+        Err(why) => why.code(),
+    }
+}

@@ -1,0 +1,185 @@
+//! One sequence through the pipeline: the loop that `run` and `demo` share.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use anyhow::Result;
+use egomotion::geometry::{Grid, Image, RigidMotion, StereoRig, Twist};
+use egomotion::pipeline::stereo::StageTimes;
+use egomotion::pipeline::{Config, FrameMotion, StereoFrame, StereoMotion, Trajectory};
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::feed::{Fetched, with_frames};
+use crate::results::ResultFolder;
+
+/// What is to be run.
+pub struct Session<'a> {
+    pub rig: StereoRig,
+    pub config: &'a Config,
+    /// Number of frames.
+    pub frames: usize,
+    /// Pixels never to use.
+    pub mask: Option<Grid<bool>>,
+    /// Write the maps of every frame.
+    pub maps: bool,
+    pub progress: ProgressBar,
+}
+
+/// One answered or unanswered frame, without its maps.
+pub struct Row {
+    /// Index of the frame in the source.
+    pub index: usize,
+    pub motion: FrameMotion,
+    /// True φ over the same interval.
+    pub truth: Option<Twist>,
+}
+
+/// What a session leaves behind.
+pub struct Outcome {
+    pub rows: Vec<Row>,
+    pub trajectory: Trajectory,
+    /// True poses, relative to the first frame; only if every frame has one.
+    pub truth: Option<Vec<RigidMotion>>,
+    pub complete: bool,
+    pub stages_ms: Vec<(&'static str, f64)>,
+    pub frame_ms: f64,
+    pub wall_s: f64,
+}
+
+/// Set when the user asks to stop.
+pub fn stop_signal() -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let handler = Arc::clone(&stop);
+    // Only the first session of a process can install it; a second one shares the default.
+    let _ = ctrlc::set_handler(move || handler.store(true, Ordering::Relaxed));
+    stop
+}
+
+/// A progress bar on a terminal, nothing in a pipe.
+pub fn progress(frames: usize, quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(frames as u64);
+    let template = "{msg} {wide_bar} {pos}/{len} frames, {per_sec}, {eta} left";
+    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar
+}
+
+impl Session<'_> {
+    /// Push every frame through the pipeline; `look` sees each answer with its maps and the earlier left image.
+    pub fn run(
+        &self,
+        stop: &AtomicBool,
+        out: &ResultFolder,
+        fetch: impl Fn(usize) -> Fetched + Sync,
+        mut look: impl FnMut(&Row, Option<&Image>) -> Result<()>,
+    ) -> Result<Outcome> {
+        let mut pipeline = StereoMotion::new(self.rig, self.config.clone())?;
+        pipeline.set_mask(self.mask.clone());
+        let start = Instant::now();
+        let mut tally = Tally::default();
+        let mut rows: Vec<Row> = Vec::new();
+        let mut trajectory = Trajectory::new();
+        let mut truths: Vec<Option<RigidMotion>> = Vec::new();
+        let mut reference_image: Option<(usize, Image)> = None;
+        with_frames(self.frames, stop, fetch, |frames| -> Result<()> {
+            for fetched in frames {
+                let Fetched { index, time_s, pair, truth, decode_ms } = fetched;
+                truths.push(truth);
+                let keep = pair.as_ref().ok().map(|(left, _)| left.clone());
+                let motion = match pair {
+                    Ok((left, right)) => pipeline.push(StereoFrame { time_s, left, right }),
+                    Err(why) => pipeline.skip(time_s, why),
+                };
+                if let Err(why) = &motion.motion
+                    && motion.frame > 0
+                {
+                    self.progress.suspend(|| eprintln!("egomotion: frame {index}: {why}"));
+                }
+                tally.add(decode_ms, &motion.stages);
+                trajectory.push(&motion);
+                let frame = motion.frame;
+                let reference = motion.reference;
+                let true_motion = reference.and_then(|r| truths[r]).zip(truth).map(|(a, b)| relative(&a, &b));
+                let mut row = Row { index, motion, truth: true_motion };
+                let writing = Instant::now();
+                let earlier = reference_image.as_ref().filter(|(f, _)| Some(*f) == reference);
+                look(&row, earlier.map(|(_, image)| image))?;
+                if self.maps
+                    && let (Some(dense), Some(r)) = (&row.motion.dense, reference)
+                {
+                    out.write_maps(rows.get(r).map_or(r, |row| row.index), dense)?;
+                }
+                tally.aside_ms += writing.elapsed().as_secs_f64() * 1e3;
+                // Maps are large; a long run keeps only its rows.
+                row.motion.dense = None;
+                if pipeline.reference() == Some(frame)
+                    && let Some(image) = keep
+                {
+                    reference_image = Some((frame, image));
+                }
+                rows.push(row);
+                self.progress.inc(1);
+            }
+            Ok(())
+        })?;
+        self.progress.finish_and_clear();
+        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+        let count = rows.len().max(1) as f64;
+        let first = truths.first().copied().flatten();
+        let truth: Option<Vec<RigidMotion>> =
+            truths.iter().map(|pose| Some(first?.inverse().after(&(*pose)?))).collect();
+        Ok(Outcome {
+            complete: rows.len() == self.frames,
+            rows,
+            trajectory,
+            truth,
+            stages_ms: tally.means(count),
+            frame_ms: (wall_ms - tally.aside_ms) / count,
+            wall_s: wall_ms / 1e3,
+        })
+    }
+}
+
+/// φ of the scene between two true camera poses.
+fn relative(before: &RigidMotion, after: &RigidMotion) -> Twist {
+    after.inverse().after(before).log()
+}
+
+/// Milliseconds by stage, summed over frames.
+#[derive(Default)]
+struct Tally {
+    decode_ms: f64,
+    stages: StageTimes,
+    /// Spent on writing and pictures, which is not the pipeline's.
+    aside_ms: f64,
+}
+
+impl Tally {
+    fn add(&mut self, decode_ms: f64, stages: &StageTimes) {
+        self.decode_ms += decode_ms;
+        self.stages.pyramids_ms += stages.pyramids_ms;
+        self.stages.disparity_ms += stages.disparity_ms;
+        self.stages.tracks_ms += stages.tracks_ms;
+        self.stages.flow_ms += stages.flow_ms;
+        self.stages.estimate_ms += stages.estimate_ms;
+        self.stages.maps_ms += stages.maps_ms;
+    }
+
+    fn means(&self, count: f64) -> Vec<(&'static str, f64)> {
+        let s = &self.stages;
+        [
+            ("decode", self.decode_ms),
+            ("pyramids", s.pyramids_ms),
+            ("disparity", s.disparity_ms),
+            ("tracks", s.tracks_ms),
+            ("flow", s.flow_ms),
+            ("estimate", s.estimate_ms),
+            ("maps", s.maps_ms),
+        ]
+        .map(|(name, total)| (name, total / count))
+        .to_vec()
+    }
+}

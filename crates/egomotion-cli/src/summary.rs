@@ -1,0 +1,78 @@
+//! `summary.json`: what was run, how it went, and where the time was spent.
+
+use std::collections::BTreeMap;
+
+use egomotion::geometry::StereoRig;
+use egomotion::pipeline::Config;
+use serde::Serialize;
+
+use crate::judge::{MapVerdict, MotionVerdict};
+use crate::results::status;
+use crate::session::Outcome;
+
+#[derive(Serialize)]
+pub struct Summary {
+    pub version: &'static str,
+    pub source: String,
+    pub frames: usize,
+    /// Whether every frame was done.
+    pub complete: bool,
+    pub rig: StereoRig,
+    pub config: Config,
+    pub seed: u64,
+    /// Rows by status.
+    pub counts: BTreeMap<&'static str, usize>,
+    /// Mean milliseconds per frame.
+    pub stages_ms: BTreeMap<&'static str, f64>,
+    /// From the first decode to the last motion row, over frames; writing and report excluded.
+    pub frame_ms: f64,
+    pub wall_s: f64,
+    /// Against the source's own truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<MotionVerdict>,
+    /// Maps against the source's own truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth_maps: Option<MapVerdict>,
+}
+
+impl Summary {
+    pub fn new(source: String, rig: StereoRig, config: &Config, outcome: &Outcome) -> Self {
+        let mut counts = BTreeMap::new();
+        for row in outcome.rows.iter().skip(1) {
+            *counts.entry(status(row)).or_insert(0) += 1;
+        }
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            source,
+            frames: outcome.rows.len(),
+            complete: outcome.complete,
+            rig,
+            seed: config.seed,
+            config: config.clone(),
+            counts,
+            stages_ms: outcome.stages_ms.iter().copied().collect(),
+            frame_ms: outcome.frame_ms,
+            wall_s: outcome.wall_s,
+            truth: MotionVerdict::of(outcome),
+            truth_maps: None,
+        }
+    }
+}
+
+/// An index over the scenes of a set.
+#[derive(Serialize)]
+pub struct Index {
+    pub version: &'static str,
+    pub source: String,
+    pub complete: bool,
+    pub scenes: Vec<SceneEntry>,
+}
+
+#[derive(Serialize)]
+pub struct SceneEntry {
+    pub scene: String,
+    pub frames: usize,
+    pub counts: BTreeMap<&'static str, usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth_maps: Option<MapVerdict>,
+}
