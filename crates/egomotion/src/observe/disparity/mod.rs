@@ -48,12 +48,12 @@ impl Default for DisparityOptions {
         Self {
             levels: 128,
             census: CensusWindow::default(),
-            penalty_small: 8,
-            penalty_large: 90,
-            penalty_large_least: 24,
+            penalty_small: 20,
+            penalty_large: 190,
+            penalty_large_least: 50,
             edge_contrast: 4.0,
-            uniqueness: 0.05,
-            left_right_tolerance: 1,
+            uniqueness: 0.01,
+            left_right_tolerance: 2,
             speckle_size: 100,
             speckle_range: 1.0,
             refinement_steps: 3,
@@ -100,6 +100,7 @@ pub enum DisparityError {
 #[derive(Debug, Clone, Default)]
 pub struct DisparityMatcher {
     options: DisparityOptions,
+    smoothed: Vec<f32>,
     left_words: Vec<u64>,
     right_words: Vec<u64>,
     semi_global: semi_global::SemiGlobal,
@@ -135,8 +136,8 @@ impl DisparityMatcher {
             return Ok(map);
         }
         let options = &self.options;
-        census::transform(left, options.census, &mut self.left_words);
-        census::transform(right, options.census, &mut self.right_words);
+        census::transform(left, options.census, &mut self.smoothed, &mut self.left_words);
+        census::transform(right, options.census, &mut self.smoothed, &mut self.right_words);
         self.winners.resize(width * height, f32::NAN);
         let pair = semi_global::Pair {
             left,

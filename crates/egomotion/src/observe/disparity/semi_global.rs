@@ -175,6 +175,7 @@ struct Strip {
     matching: Vec<u8>,
     sums: Vec<u16>,
     reversed: Vec<u64>,
+    best: Vec<usize>,
     right: RightWinners,
     /// Whether the row above has been swept.
     started: bool,
@@ -262,19 +263,21 @@ impl Strip {
         }
     }
 
-    /// The winner of every pixel of the row just swept, if it is inside, unique and found from the
-    /// right image too.
+    /// The winner of every pixel of the row just swept, if it is inside, unique and not a better
+    /// match of another pixel.
     fn choose(&mut self, levels: usize, options: &DisparityOptions, winners: &mut [f32]) {
         self.right.start_row(winners.len());
+        self.best.clear();
         for (u, costs) in self.sums.chunks(levels).enumerate() {
-            self.right.offer(u, &costs[..levels.min(u + 1)]);
+            let least = costs.iter().copied().min().unwrap_or_default();
+            let best = costs.iter().position(|&cost| cost == least).unwrap_or_default();
+            self.right.claim(u, best, least);
+            self.best.push(best);
         }
-        for (u, (costs, winner)) in self.sums.chunks(levels).zip(winners).enumerate() {
-            let least = costs.iter().copied().min();
-            let best = costs.iter().position(|&cost| Some(cost) == least).unwrap_or_default();
-            let believed = best <= u
-                && is_unique(&costs[..levels.min(u + 1)], best, options.uniqueness)
-                && self.right.agree(u, best, options.left_right_tolerance);
+        let pixels = self.sums.chunks(levels).zip(&self.best).zip(winners);
+        for (u, ((costs, &best), winner)) in pixels.enumerate() {
+            let believed = self.right.agree(u, best, options.left_right_tolerance)
+                && is_unique(&costs[..levels.min(u + 1)], best, options.uniqueness);
             *winner = if believed { best as f32 + parabola(costs, best) } else { f32::NAN };
         }
     }
