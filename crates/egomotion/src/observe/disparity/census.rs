@@ -117,7 +117,8 @@ mod tests {
             let mut words = Vec::new();
             transform(&peak, window, &mut Vec::new(), &mut words);
             assert_eq!(words[7 * 15 + 7].count_ones(), window.bits());
-            assert_eq!(words.iter().filter(|w| **w != 0).count(), 1);
+            // Smoothing spreads the peak over 3 × 3 pixels; all others are nowhere brighter.
+            assert_eq!(words.iter().filter(|w| **w != 0).count(), 9);
         }
     }
 }

@@ -25,6 +25,9 @@ const CONTRADICTED_SIGMA: f32 = 1.0;
 const CONTRADICTION: f32 = 1.0;
 /// What no image noise explains (interpolation, calibration), in pixels.
 const MODEL_SIGMA: f32 = 0.03;
+/// Variance, in squares of the last step, for the depth inside a window that no one step fits;
+/// measured on Middlebury pairs.
+const MISFIT_WEIGHT: f32 = 3.0;
 /// Weight of the whole image's noise against a window's own, in pixels of the window.
 const NOISE_PRIOR_PIXELS: f32 = 8.0;
 
@@ -311,6 +314,8 @@ fn posterior(prior: f32, compared: f32, fit: Fit) -> (f32, f32) {
     let prior_information = PRIOR_SIGMA.powi(-2);
     let information = fit.information + prior_information;
     let refined = compared + (fit.pull + prior_information * (prior - compared)) / information;
-    let sigma = (information.recip() + MODEL_SIGMA * MODEL_SIGMA).sqrt();
+    // A surface on which the window's pixels do not agree still moves in the last step.
+    let misfit = MISFIT_WEIGHT * (refined - compared).powi(2);
+    let sigma = (information.recip() + misfit + MODEL_SIGMA * MODEL_SIGMA).sqrt();
     if (refined - prior).abs() <= CONTRADICTION { (refined, sigma) } else { (prior, CONTRADICTED_SIGMA) }
 }
