@@ -48,8 +48,7 @@ fn plane_pair(plane: Plane, sigma: f64, seed: u64) -> (Image, Image) {
     let texture = Texture::new(seed);
     let mut random = Pcg64Mcg::seed_from_u64(seed + 1);
     let mut noise = || sigma * Distribution::<f64>::sample(&StandardNormal, &mut random);
-    let left =
-        Image::from_fn(SIZE.0, SIZE.1, |u, v| (texture.grey(u as f64, v as f64) + noise()) as f32);
+    let left = Image::from_fn(SIZE.0, SIZE.1, |u, v| (texture.grey(u as f64, v as f64) + noise()) as f32);
     let right = Image::from_fn(SIZE.0, SIZE.1, |x, v| {
         (texture.grey(plane.left_column(x as f64, v as f64), v as f64) + noise()) as f32
     });
@@ -89,7 +88,8 @@ fn robust_deviation(values: &[f64]) -> f64 {
 
 #[test]
 fn planes_are_found_to_a_tenth_of_a_pixel_and_sigma_is_honest() {
-    let planes = [Plane(7.3, 0.0, 0.0), Plane(6.0, 0.06, 0.0), Plane(4.0, -0.01, 0.15), Plane(12.0, 0.03, 0.08)];
+    let planes =
+        [Plane(7.3, 0.0, 0.0), Plane(6.0, 0.06, 0.0), Plane(4.0, -0.01, 0.15), Plane(12.0, 0.03, 0.08)];
     for (seed, plane) in (10..).zip(planes) {
         for noise in [1.0, 3.0] {
             let (left, right) = plane_pair(plane, noise, seed);
@@ -99,7 +99,10 @@ fn planes_are_found_to_a_tenth_of_a_pixel_and_sigma_is_honest() {
             let error = median(errors.iter().map(|e| e.0.abs()).collect());
             let z: Vec<f64> = errors.iter().map(|(e, sigma, _)| e / sigma).collect();
             let spread = robust_deviation(&z);
-            println!("seed {seed} noise {noise}: error {error:.4} px, z {spread:.3}, bias {:.4}", median(errors.iter().map(|e| e.0).collect()));
+            println!(
+                "seed {seed} noise {noise}: error {error:.4} px, z {spread:.3}, bias {:.4}",
+                median(errors.iter().map(|e| e.0).collect())
+            );
             assert!(error < 0.1, "median error {error} px");
             assert!((0.7..1.4).contains(&spread), "robust deviation of error/sigma {spread}");
         }
@@ -128,8 +131,11 @@ fn hidden_background_stays_missing() {
     let view = |d_near: f64, d_far: f64| {
         Image::from_fn(SIZE.0, SIZE.1, |x, v| {
             let (x, v) = (x as f64, v as f64);
-            let grey =
-                if inside(x + d_near, v) { square.grey(x + d_near, v) } else { background.grey(x + d_far, v) };
+            let grey = if inside(x + d_near, v) {
+                square.grey(x + d_near, v)
+            } else {
+                background.grey(x + d_far, v)
+            };
             grey as f32
         })
     };

@@ -139,12 +139,8 @@ impl DisparityMatcher {
         census::transform(left, options.census, &mut self.smoothed, &mut self.left_words);
         census::transform(right, options.census, &mut self.smoothed, &mut self.right_words);
         self.winners.resize(width * height, f32::NAN);
-        let pair = semi_global::Pair {
-            left,
-            left_words: &self.left_words,
-            right_words: &self.right_words,
-            levels,
-        };
+        let pair =
+            semi_global::Pair { left, left_words: &self.left_words, right_words: &self.right_words, levels };
         self.semi_global.winners(&pair, options, &mut self.winners);
         let (size, range) = (options.speckle_size, options.speckle_range);
         check::remove_speckles(&mut self.winners, width, size, range, &mut self.speckles);

@@ -18,16 +18,16 @@ const LANES: usize = 8;
 /// per pixel of distance from it.
 const SAME_SURFACE: (f32, f32) = (0.5, 0.25);
 /// Standard deviation of the semi-global disparity, in pixels.
-const PRIOR_SIGMA: f32 = 0.4;
+const PRIOR_SIGMA: f32 = 0.5;
 /// Standard deviation where the refinement contradicts the semi-global disparity, in pixels.
 const CONTRADICTED_SIGMA: f32 = 1.0;
 /// Correction of the semi-global disparity beyond which it counts as contradicted, in pixels.
 const CONTRADICTION: f32 = 1.0;
-/// What no image noise explains (interpolation, calibration), in pixels.
-const MODEL_SIGMA: f32 = 0.03;
+/// What no image noise explains (interpolation), in pixels.
+const MODEL_SIGMA: f32 = 0.01;
 /// Variance, in squares of the last step, for the depth inside a window that no one step fits;
 /// measured on Middlebury pairs.
-const MISFIT_WEIGHT: f32 = 3.0;
+const MISFIT_WEIGHT: f32 = 2.5;
 /// Weight of the whole image's noise against a window's own, in pixels of the window.
 const NOISE_PRIOR_PIXELS: f32 = 8.0;
 
@@ -154,23 +154,24 @@ impl Refinement {
     fn compare(&mut self, left: &Image, right: &Image) {
         let layout = self.layout;
         let planes = layout.rows(&mut self.disparity).zip(layout.rows(&mut self.difference));
-        planes.zip(layout.rows(&mut self.slope)).for_each(|(((v, disparity), (_, difference)), (_, slope))| {
-            let (left, right) = (left.row(v), right.row(v));
-            for (u, disparity) in disparity.iter_mut().enumerate() {
-                let neighbours = (u.checked_sub(1).and_then(|u| left.get(u)), left.get(u + 1));
-                let read = cubic(right, u as f32 - *disparity);
-                (difference[u], slope[u]) = match (neighbours, read) {
-                    ((Some(before), Some(after)), Some((grey, gradient))) => {
-                        // The mean of both gradients is right to second order.
-                        (left[u] - grey, 0.5 * (0.5 * (after - before) + gradient))
-                    }
-                    _ => {
-                        *disparity = f32::NAN;
-                        (0.0, 0.0)
-                    }
-                };
-            }
-        });
+        planes.zip(layout.rows(&mut self.slope)).for_each(
+            |(((v, disparity), (_, difference)), (_, slope))| {
+                let (left, right) = (left.row(v), right.row(v));
+                for (u, disparity) in disparity.iter_mut().enumerate() {
+                    let neighbours = (u.checked_sub(1).and_then(|u| left.get(u)), left.get(u + 1));
+                    let read = cubic(right, u as f32 - *disparity);
+                    (difference[u], slope[u]) = match (neighbours, read) {
+                        // The right image's own slope would carry the noise of the grey level read there,
+                        // and pull every answer towards half pixels.
+                        ((Some(before), Some(after)), Some(grey)) => (left[u] - grey, 0.5 * (after - before)),
+                        _ => {
+                            *disparity = f32::NAN;
+                            (0.0, 0.0)
+                        }
+                    };
+                }
+            },
+        );
     }
 
     /// Median over the image of the noise variance of the last step; `None` before the first.
@@ -202,17 +203,15 @@ impl Refinement {
     }
 }
 
-/// Grey level and its gradient at column `u` of a row: Catmull–Rom cubic; `None` outside.
-fn cubic(row: &[f32], u: f32) -> Option<(f32, f32)> {
+/// Grey level at column `u` of a row, Catmull–Rom cubic; `None` outside.
+fn cubic(row: &[f32], u: f32) -> Option<f32> {
     if !(u >= 1.0 && u < row.len() as f32 - 2.0) {
         return None;
     }
     let first = u as usize - 1;
     let &[a, b, c, d] = row.get(first..first + 4)? else { return None };
     let t = u - u.floor();
-    let (k1, k2, k3) = (c - a, 2.0 * a - 5.0 * b + 4.0 * c - d, 3.0 * (b - c) + d - a);
-    let grey = b + 0.5 * t * (k1 + t * (k2 + t * k3));
-    Some((grey, 0.5 * (k1 + t * (2.0 * k2 + t * 3.0 * k3))))
+    Some(b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a))))
 }
 
 /// The mean of each pixel's surface over its window.
@@ -263,7 +262,13 @@ struct Fit {
 }
 
 impl Sums {
-    fn gather(window: &[(isize, f32)], at: usize, disparity: &[f32], difference: &[f32], slope: &[f32]) -> Self {
+    fn gather(
+        window: &[(isize, f32)],
+        at: usize,
+        disparity: &[f32],
+        difference: &[f32],
+        slope: &[f32],
+    ) -> Self {
         let mut sums = Self::default();
         let centre = lanes(disparity, at);
         for &(offset, tolerance) in window {
@@ -298,8 +303,8 @@ impl Sums {
             Some(typical) => (residual + NOISE_PRIOR_PIXELS * typical) / (n - 2.0 + NOISE_PRIOR_PIXELS),
             None => own,
         };
-        // Noise makes slopes of its own, ⅛ of the variance of the difference: they are no texture.
-        let texture = (gg - 0.125 * n * noise).max(0.0);
+        // Noise makes slopes of its own, ¼ of the variance of the difference: they are no texture.
+        let texture = (gg - 0.25 * n * noise).max(0.0);
         let scale = if gg > 0.0 && noise > 0.0 { texture / (gg * noise) } else { 0.0 };
         Fit { pull: -ge * scale, information: gg * scale, noise: own }
     }
