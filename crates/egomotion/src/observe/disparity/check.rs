@@ -4,10 +4,11 @@
 ///
 /// A winner without a rival to compare with is not unique.
 pub(super) fn is_unique(costs: &[u16], best: usize, margin: f32) -> bool {
-    let before = costs[..best.saturating_sub(1)].iter().min();
-    let after = costs.get(best + 2..).unwrap_or_default().iter().min();
-    let rival = before.into_iter().chain(after).min();
-    rival.is_some_and(|&rival| f32::from(rival) * (1.0 - margin) > f32::from(costs[best]))
+    let least = |costs: &[u16]| costs.iter().copied().fold(u16::MAX, u16::min);
+    let before = &costs[..best.saturating_sub(1)];
+    let after = costs.get(best + 2..).unwrap_or_default();
+    let rival = least(before).min(least(after));
+    !(before.is_empty() && after.is_empty()) && f32::from(rival) * (1.0 - margin) > f32::from(costs[best])
 }
 
 /// What one row of the right image was matched to: for each of its pixels the best of the left

@@ -122,7 +122,7 @@ impl PathRow {
         let stride = self.levels + 2;
         self.costs[u * stride + 1..(u + 1) * stride - 1].copy_from_slice(matching);
         sum.iter_mut().zip(matching).for_each(|(sum, &cost)| *sum += u16::from(cost));
-        self.least[u] = matching.iter().copied().min().unwrap_or_default();
+        self.least[u] = matching.iter().copied().fold(u8::MAX, u8::min);
     }
 
     fn pixel(&self, u: usize) -> Path<'_> {
@@ -258,7 +258,7 @@ impl Strip {
                 *cost = (word ^ candidate).count_ones() as u8;
             }
             if !outside.is_empty() {
-                outside.fill(inside.iter().copied().min().unwrap_or_default());
+                outside.fill(inside.iter().copied().fold(u8::MAX, u8::min));
             }
         }
     }
@@ -269,7 +269,7 @@ impl Strip {
         self.right.start_row(winners.len());
         self.best.clear();
         for (u, costs) in self.sums.chunks(levels).enumerate() {
-            let least = costs.iter().copied().min().unwrap_or_default();
+            let least = costs.iter().copied().fold(u16::MAX, u16::min);
             let best = costs.iter().position(|&cost| cost == least).unwrap_or_default();
             self.right.claim(u, best, least);
             self.best.push(best);

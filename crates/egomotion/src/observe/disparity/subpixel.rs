@@ -220,23 +220,28 @@ fn smooth(layout: Layout, plane: &[f32], smoothed: &mut [f32]) {
     layout.rows(smoothed).for_each(|(v, smoothed)| {
         for (chunk, smoothed) in smoothed.chunks_mut(LANES).enumerate() {
             let at = layout.start(v) + chunk * LANES;
-            let centre = lanes(plane, at);
-            let (mut count, mut sum) = ([0.0; LANES], [0.0; LANES]);
-            for &(offset, tolerance) in &window {
-                let near = lanes(plane, at.wrapping_add_signed(offset));
-                for lane in 0..LANES {
-                    let change = near[lane] - centre[lane];
-                    let same = change.abs() <= tolerance;
-                    count[lane] += if same { 1.0 } else { 0.0 };
-                    sum[lane] += if same { change } else { 0.0 };
-                }
-            }
-            // A missing centre stays missing: its sums are 0, and 0/0 is NaN.
-            for (lane, smoothed) in smoothed.iter_mut().enumerate() {
-                *smoothed = centre[lane] + sum[lane] / count[lane];
-            }
+            let mean = surface_mean(&window, at, plane);
+            smoothed.copy_from_slice(&mean[..smoothed.len()]);
         }
     });
+}
+
+/// The mean of the surface over eight windows; missing where the centre is.
+#[inline(never)]
+fn surface_mean(window: &[(isize, f32)], at: usize, plane: &[f32]) -> [f32; LANES] {
+    let centre = lanes(plane, at);
+    let (mut count, mut sum) = ([0.0; LANES], [0.0; LANES]);
+    for &(offset, tolerance) in window {
+        let near = lanes(plane, at.wrapping_add_signed(offset));
+        for lane in 0..LANES {
+            let change = near[lane] - centre[lane];
+            // A mask instead of a choice: it vectorises, and is safe where the change is NaN.
+            let same = if change.abs() <= tolerance { u32::MAX } else { 0 };
+            count[lane] += f32::from_bits(same & 1.0_f32.to_bits());
+            sum[lane] += f32::from_bits(same & change.to_bits());
+        }
+    }
+    std::array::from_fn(|lane| centre[lane] + sum[lane] / count[lane])
 }
 
 /// Sums over eight windows: of the pixels of the same surface, their slopes g, differences e and products.
