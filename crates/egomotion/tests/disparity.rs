@@ -99,10 +99,6 @@ fn planes_are_found_to_a_tenth_of_a_pixel_and_sigma_is_honest() {
             let error = median(errors.iter().map(|e| e.0.abs()).collect());
             let z: Vec<f64> = errors.iter().map(|(e, sigma, _)| e / sigma).collect();
             let spread = robust_deviation(&z);
-            println!(
-                "seed {seed} noise {noise}: error {error:.4} px, z {spread:.3}, bias {:.4}",
-                median(errors.iter().map(|e| e.0).collect())
-            );
             assert!(error < 0.1, "median error {error} px");
             assert!((0.7..1.4).contains(&spread), "robust deviation of error/sigma {spread}");
         }
@@ -117,7 +113,6 @@ fn no_disparity_is_locked_to_whole_pixels() {
     for bin in 0..8 {
         let phase = |d: f64| (d.rem_euclid(1.0) * 8.0) as usize == bin;
         let bias = median(errors.iter().filter(|e| phase(e.2)).map(|e| e.0).collect());
-        println!("phase {bin}: {bias}");
         assert!(bias.abs() < 0.05, "bias {bias} px at a fraction of {}", bin as f64 / 8.0);
     }
 }
@@ -148,7 +143,6 @@ fn hidden_background_stays_missing() {
     let hidden = share(78..88, &|d| d.is_none());
     let seen = share(94..136, &|d| d.is_some_and(|d| (d - 20.0).abs() < 0.5));
     let beyond = share(146..190, &|d| d.is_some_and(|d| (d - 6.0).abs() < 0.5));
-    println!("hidden {hidden} seen {seen} beyond {beyond}");
     assert!(hidden > 0.9, "{hidden} of the hidden pixels are missing");
     assert!(seen > 0.95 && beyond > 0.95, "{seen} of the square, {beyond} of the background");
 }
@@ -238,4 +232,22 @@ fn the_answer_depends_neither_on_threads_nor_on_the_pair_before() {
             assert_eq!(bits(&map), bits(&alone));
         });
     }
+}
+
+#[test]
+fn identical_images_have_no_disparity_and_a_small_sigma() {
+    let (left, _) = plane_pair(Plane(0.0, 0.0, 0.0), 1.0, 90);
+    let map = compute(&left, &left);
+    let errors = errors(&map, Plane(0.0, 0.0, 0.0));
+    assert!(errors.len() as f64 > 0.9 * (SIZE.0 * SIZE.1) as f64);
+    assert!(median(errors.iter().map(|e| e.0.abs()).collect()) < 0.01);
+    assert!(median(errors.iter().map(|e| e.1).collect()) < 0.05);
+}
+
+#[test]
+fn options_are_read_by_name_and_unknown_ones_refused() {
+    let read = |text| serde_json::from_str::<DisparityOptions>(text);
+    let expected = DisparityOptions { levels: 64, ..DisparityOptions::default() };
+    assert_eq!(read(r#"{ "levels": 64, "census": "nine-by-seven" }"#).ok(), Some(expected));
+    assert!(read(r#"{ "level": 64 }"#).is_err());
 }

@@ -1,11 +1,12 @@
 //! Dense disparity of a rectified pair, with its standard deviation.
 //!
-//! Four steps: [`census`] words of both images, [`semi_global`] matching, the [`check`]s that decide
-//! which winners to believe, and [`subpixel`] refinement. Pixels without a believed match, such as
+//! Four steps: census words of both images, semi-global matching, checks that decide which winners
+//! to believe, and photometric sub-pixel refinement. Pixels without a believed match, such as
 //! those hidden from one camera, stay missing: nothing is filled in.
 
 mod census;
 mod check;
+mod lucas_kanade;
 mod semi_global;
 mod subpixel;
 
@@ -131,7 +132,7 @@ impl DisparityMatcher {
         let (width, height) = left.size();
         let mut map =
             DisparityMap { shift: Field::missing(width, height), sigma: Field::missing(width, height) };
-        let levels = self.options.levels.min(width);
+        let levels = self.options.levels.min(width).min(usize::from(u16::MAX));
         if width == 0 || height == 0 || levels == 0 {
             return Ok(map);
         }

@@ -18,7 +18,7 @@ const STRIP_ROWS: usize = 96;
 const WARM_UP_ROWS: usize = 20;
 /// Cost beyond the ends of the levels: no path enters from there.
 const WALL: u8 = u8::MAX;
-/// Largest penalty for which a path cost (at most 64 + penalty) still fits into 8 bits.
+/// Largest penalty for which a path cost (at most 62 + penalty) still fits into 8 bits.
 const LARGEST_PENALTY: u8 = 190;
 
 /// The census words of a pair and what the sweeps need to know of it.
@@ -165,6 +165,14 @@ fn extend(before: Path<'_>, p1: u8, p2: u8, matching: &[u8], here: &mut [u8], su
     least
 }
 
+/// Number of bits in which each candidate differs from the word.
+#[inline(never)]
+fn hamming(word: u64, candidates: &[u64], distances: &mut [u8]) {
+    for (distance, candidate) in distances.iter_mut().zip(candidates) {
+        *distance = (word ^ candidate).count_ones() as u8;
+    }
+}
+
 /// One strip's work space: two rows of three downward paths, one row of everything else.
 #[derive(Debug, Clone, Default)]
 struct Strip {
@@ -184,7 +192,7 @@ struct Strip {
 impl Strip {
     fn start(&mut self, width: usize, levels: usize) {
         self.above.iter_mut().chain(&mut self.here).for_each(|row| row.start(width, levels));
-        // A row along the image needs the pixel before alone: two, used by turns.
+        // A path along the row needs the pixel before alone: two, used by turns.
         self.along.iter_mut().for_each(|row| row.start(2, levels));
         self.matching.resize(width * levels, 0);
         self.sums.resize(width * levels, 0);
@@ -254,9 +262,7 @@ impl Strip {
         for (u, (costs, &word)) in costs.zip(&pair.left_words[row]).enumerate() {
             let (inside, outside) = costs.split_at_mut(pair.levels.min(u + 1));
             let candidates = &self.reversed[width - 1 - u..];
-            for (cost, candidate) in inside.iter_mut().zip(candidates) {
-                *cost = (word ^ candidate).count_ones() as u8;
-            }
+            hamming(word, candidates, inside);
             if !outside.is_empty() {
                 outside.fill(inside.iter().copied().fold(u8::MAX, u8::min));
             }
