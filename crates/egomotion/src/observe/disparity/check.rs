@@ -4,47 +4,37 @@
 ///
 /// A winner without a rival to compare with is not unique.
 pub(super) fn is_unique(costs: &[u16], best: usize, margin: f32) -> bool {
-    let before = costs[..best.saturating_sub(1)].iter().min();
-    let after = costs.get(best + 2..).unwrap_or_default().iter().min();
-    let rival = before.into_iter().chain(after).min();
-    rival.is_some_and(|&rival| f32::from(rival) * (1.0 - margin) > f32::from(costs[best]))
+    let least = |costs: &[u16]| costs.iter().copied().fold(u16::MAX, u16::min);
+    let before = &costs[..best.saturating_sub(1)];
+    let after = costs.get(best + 2..).unwrap_or_default();
+    let rival = least(before).min(least(after));
+    !(before.is_empty() && after.is_empty()) && f32::from(rival) * (1.0 - margin) > f32::from(costs[best])
 }
 
-/// The winners of one row of the right image, read from the costs of the left one.
-///
-/// Entry `i` belongs to the right pixel `width − 1 − i`: reversed, so that the costs of one left
-/// pixel fall on consecutive entries.
+/// What one row of the right image was matched to: for each of its pixels the best of the left
+/// pixels that won with it.
 #[derive(Debug, Clone, Default)]
-pub(super) struct RightWinners {
-    costs: Vec<u16>,
-    levels: Vec<u16>,
-}
+pub(super) struct RightWinners(Vec<(u16, u16)>);
 
 impl RightWinners {
     /// Forget the last row.
     pub(super) fn start_row(&mut self, width: usize) {
-        self.costs.clear();
-        self.costs.resize(width, u16::MAX);
-        self.levels.clear();
-        self.levels.resize(width, 0);
+        self.0.clear();
+        self.0.resize(width, (u16::MAX, 0));
     }
 
-    /// Offer the costs of left pixel `u`, of the levels 0 … that stay inside the right image.
-    pub(super) fn offer(&mut self, u: usize, costs: &[u16]) {
-        let first = self.costs.len() - 1 - u;
-        let bests = &mut self.costs[first..first + costs.len()];
-        let levels = &mut self.levels[first..first + costs.len()];
-        for (level, ((best, winner), &cost)) in (0_u16..).zip(bests.iter_mut().zip(levels).zip(costs)) {
-            let better = cost < *best;
-            *winner = if better { level } else { *winner };
-            *best = if better { cost } else { *best };
+    /// Left pixel `u` won at `level` with `cost`.
+    pub(super) fn claim(&mut self, u: usize, level: usize, cost: u16) {
+        if let Some(best) = u.checked_sub(level).and_then(|u| self.0.get_mut(u)) {
+            *best = (*best).min((cost, level as u16));
         }
     }
 
-    /// Whether the right pixel that left pixel `u` found at `level` found it too, within `tolerance` levels.
+    /// Whether the right pixel that left pixel `u` won at `level` was won at that level, within
+    /// `tolerance`; never outside the right image.
     pub(super) fn agree(&self, u: usize, level: usize, tolerance: usize) -> bool {
-        let entry = self.levels.len() - 1 - u + level;
-        self.levels.get(entry).is_some_and(|&back| usize::from(back).abs_diff(level) <= tolerance)
+        let best = u.checked_sub(level).and_then(|u| self.0.get(u));
+        best.is_some_and(|&(_, won)| usize::from(won).abs_diff(level) <= tolerance)
     }
 }
 
@@ -113,14 +103,15 @@ mod tests {
     }
 
     #[test]
-    fn the_right_row_keeps_its_best_left_pixel() {
+    fn a_right_pixel_keeps_its_best_left_pixel() {
         let mut right = RightWinners::default();
-        right.start_row(4);
-        right.offer(2, &[9, 9, 3]);
-        right.offer(3, &[9, 9, 9, 4]);
-        assert!(right.agree(2, 2, 0));
-        assert!(!right.agree(3, 3, 0));
-        assert!(right.agree(3, 3, 1));
+        right.start_row(6);
+        right.claim(3, 1, 7);
+        right.claim(5, 3, 4);
+        assert!(right.agree(5, 3, 0));
+        assert!(!right.agree(3, 1, 1));
+        assert!(right.agree(3, 1, 2));
+        assert!(!right.agree(2, 3, 9));
     }
 
     #[test]

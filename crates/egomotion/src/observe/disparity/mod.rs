@@ -1,11 +1,12 @@
 //! Dense disparity of a rectified pair, with its standard deviation.
 //!
-//! Four steps: [`census`] words of both images, [`semi_global`] matching, the [`check`]s that decide
-//! which winners to believe, and [`subpixel`] refinement. Pixels without a believed match, such as
+//! Four steps: census words of both images, semi-global matching, checks that decide which winners
+//! to believe, and photometric sub-pixel refinement. Pixels without a believed match, such as
 //! those hidden from one camera, stay missing: nothing is filled in.
 
 mod census;
 mod check;
+mod lucas_kanade;
 mod semi_global;
 mod subpixel;
 
@@ -48,12 +49,12 @@ impl Default for DisparityOptions {
         Self {
             levels: 128,
             census: CensusWindow::default(),
-            penalty_small: 8,
-            penalty_large: 90,
-            penalty_large_least: 24,
+            penalty_small: 20,
+            penalty_large: 190,
+            penalty_large_least: 50,
             edge_contrast: 4.0,
-            uniqueness: 0.05,
-            left_right_tolerance: 1,
+            uniqueness: 0.01,
+            left_right_tolerance: 2,
             speckle_size: 100,
             speckle_range: 1.0,
             refinement_steps: 3,
@@ -100,6 +101,7 @@ pub enum DisparityError {
 #[derive(Debug, Clone, Default)]
 pub struct DisparityMatcher {
     options: DisparityOptions,
+    smoothed: Vec<f32>,
     left_words: Vec<u64>,
     right_words: Vec<u64>,
     semi_global: semi_global::SemiGlobal,
@@ -130,13 +132,13 @@ impl DisparityMatcher {
         let (width, height) = left.size();
         let mut map =
             DisparityMap { shift: Field::missing(width, height), sigma: Field::missing(width, height) };
-        let levels = self.options.levels.min(width);
+        let levels = self.options.levels.min(width).min(usize::from(u16::MAX));
         if width == 0 || height == 0 || levels == 0 {
             return Ok(map);
         }
         let options = &self.options;
-        census::transform(left, options.census, &mut self.left_words);
-        census::transform(right, options.census, &mut self.right_words);
+        census::transform(left, options.census, &mut self.smoothed, &mut self.left_words);
+        census::transform(right, options.census, &mut self.smoothed, &mut self.right_words);
         self.winners.resize(width * height, f32::NAN);
         let pair =
             semi_global::Pair { left, left_words: &self.left_words, right_words: &self.right_words, levels };

@@ -18,7 +18,7 @@ const STRIP_ROWS: usize = 96;
 const WARM_UP_ROWS: usize = 20;
 /// Cost beyond the ends of the levels: no path enters from there.
 const WALL: u8 = u8::MAX;
-/// Largest penalty for which a path cost (at most 64 + penalty) still fits into 8 bits.
+/// Largest penalty for which a path cost (at most 62 + penalty) still fits into 8 bits.
 const LARGEST_PENALTY: u8 = 190;
 
 /// The census words of a pair and what the sweeps need to know of it.
@@ -122,7 +122,7 @@ impl PathRow {
         let stride = self.levels + 2;
         self.costs[u * stride + 1..(u + 1) * stride - 1].copy_from_slice(matching);
         sum.iter_mut().zip(matching).for_each(|(sum, &cost)| *sum += u16::from(cost));
-        self.least[u] = matching.iter().copied().min().unwrap_or_default();
+        self.least[u] = matching.iter().copied().fold(u8::MAX, u8::min);
     }
 
     fn pixel(&self, u: usize) -> Path<'_> {
@@ -165,6 +165,14 @@ fn extend(before: Path<'_>, p1: u8, p2: u8, matching: &[u8], here: &mut [u8], su
     least
 }
 
+/// Number of bits in which each candidate differs from the word.
+#[inline(never)]
+fn hamming(word: u64, candidates: &[u64], distances: &mut [u8]) {
+    for (distance, candidate) in distances.iter_mut().zip(candidates) {
+        *distance = (word ^ candidate).count_ones() as u8;
+    }
+}
+
 /// One strip's work space: two rows of three downward paths, one row of everything else.
 #[derive(Debug, Clone, Default)]
 struct Strip {
@@ -175,6 +183,7 @@ struct Strip {
     matching: Vec<u8>,
     sums: Vec<u16>,
     reversed: Vec<u64>,
+    best: Vec<usize>,
     right: RightWinners,
     /// Whether the row above has been swept.
     started: bool,
@@ -183,7 +192,7 @@ struct Strip {
 impl Strip {
     fn start(&mut self, width: usize, levels: usize) {
         self.above.iter_mut().chain(&mut self.here).for_each(|row| row.start(width, levels));
-        // A row along the image needs the pixel before alone: two, used by turns.
+        // A path along the row needs the pixel before alone: two, used by turns.
         self.along.iter_mut().for_each(|row| row.start(2, levels));
         self.matching.resize(width * levels, 0);
         self.sums.resize(width * levels, 0);
@@ -253,28 +262,28 @@ impl Strip {
         for (u, (costs, &word)) in costs.zip(&pair.left_words[row]).enumerate() {
             let (inside, outside) = costs.split_at_mut(pair.levels.min(u + 1));
             let candidates = &self.reversed[width - 1 - u..];
-            for (cost, candidate) in inside.iter_mut().zip(candidates) {
-                *cost = (word ^ candidate).count_ones() as u8;
-            }
+            hamming(word, candidates, inside);
             if !outside.is_empty() {
-                outside.fill(inside.iter().copied().min().unwrap_or_default());
+                outside.fill(inside.iter().copied().fold(u8::MAX, u8::min));
             }
         }
     }
 
-    /// The winner of every pixel of the row just swept, if it is inside, unique and found from the
-    /// right image too.
+    /// The winner of every pixel of the row just swept, if it is inside, unique and not a better
+    /// match of another pixel.
     fn choose(&mut self, levels: usize, options: &DisparityOptions, winners: &mut [f32]) {
         self.right.start_row(winners.len());
+        self.best.clear();
         for (u, costs) in self.sums.chunks(levels).enumerate() {
-            self.right.offer(u, &costs[..levels.min(u + 1)]);
+            let least = costs.iter().copied().fold(u16::MAX, u16::min);
+            let best = costs.iter().position(|&cost| cost == least).unwrap_or_default();
+            self.right.claim(u, best, least);
+            self.best.push(best);
         }
-        for (u, (costs, winner)) in self.sums.chunks(levels).zip(winners).enumerate() {
-            let least = costs.iter().copied().min();
-            let best = costs.iter().position(|&cost| Some(cost) == least).unwrap_or_default();
-            let believed = best <= u
-                && is_unique(&costs[..levels.min(u + 1)], best, options.uniqueness)
-                && self.right.agree(u, best, options.left_right_tolerance);
+        let pixels = self.sums.chunks(levels).zip(&self.best).zip(winners);
+        for (u, ((costs, &best), winner)) in pixels.enumerate() {
+            let believed = self.right.agree(u, best, options.left_right_tolerance)
+                && is_unique(&costs[..levels.min(u + 1)], best, options.uniqueness);
             *winner = if believed { best as f32 + parabola(costs, best) } else { f32::NAN };
         }
     }
