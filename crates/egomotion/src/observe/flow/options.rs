@@ -29,6 +29,9 @@ pub struct FlowOptions {
     pub sigma_floor_px: f32,
     /// A pixel is missing if the larger semi-axis of its covariance exceeds this, in pixels.
     pub max_sigma_px: f32,
+    /// A pixel is missing if the gradient energy along the weakest direction of its window is not this
+    /// many times what noise of the size of the residual makes by itself.
+    pub min_texture: f32,
     /// A pixel is missing if the residual of its window exceeds this root mean square, in grey levels.
     pub max_residual: f32,
     /// A pixel is missing if forward and backward flow disagree by more than this, in pixels;
@@ -51,6 +54,7 @@ impl Default for FlowOptions {
             noise_floor: 0.7,
             sigma_floor_px: 0.02,
             max_sigma_px: 0.5,
+            min_texture: 1.0,
             max_residual: 25.0,
             consistency_px: 1.5,
             consistency_level: 1,
@@ -68,6 +72,7 @@ impl FlowOptions {
             (self.noise_floor > 0.0, "noise_floor must be positive"),
             (self.sigma_floor_px >= 0.0, "sigma_floor_px must not be negative"),
             (self.max_sigma_px > 0.0, "max_sigma_px must be positive"),
+            (self.min_texture >= 0.0, "min_texture must not be negative"),
             (self.max_residual > 0.0, "max_residual must be positive"),
             (self.consistency_px > 0.0, "consistency_px must be positive"),
         ];

@@ -14,9 +14,6 @@ const MAX_LAST_STEP_PX: f32 = 0.5;
 /// No step is longer than this, in pixels: the images are linear over little more.
 const MAX_STEP_PX: f32 = 1.0;
 
-/// Least ratio of a window's weakest gradient energy to what noise alone makes.
-const MIN_TEXTURE: f32 = 2.0;
-
 /// Ratio of the variance that counts (of means over the window, which interpolation does not reduce) to
 /// that of single differences, of which interpolation at the fractions of a displacement averages a part.
 fn hidden_noise((u, v): (f32, f32)) -> f32 {
@@ -47,6 +44,7 @@ pub(super) fn refine(from: &Image, to: &Image, start: Displacement, options: &Fl
     let (width, height) = from.size();
     let slopes = gradients(from);
     let weights = options.window_weights();
+    let area = options.correlation_area_px();
     let mut answers = vec![MISSING; width * height];
     let mut flow = start;
     for iteration in 1..=options.refine_iterations {
@@ -60,7 +58,7 @@ pub(super) fn refine(from: &Image, to: &Image, start: Displacement, options: &Fl
             |y, sums, out| {
                 for (x, answer) in out.iter_mut().enumerate() {
                     let at = (before.u.at(x, y), before.v.at(x, y));
-                    let window = Window::new(std::array::from_fn(|i| sums[i][x]), options);
+                    let window = Window::new(std::array::from_fn(|i| sums[i][x]), area, options.noise_floor);
                     *answer = if is_last { window.answer(at, options) } else { window.step_from(at) };
                 }
             },
@@ -127,19 +125,18 @@ struct Window {
 }
 
 impl Window {
-    fn new([count, gu, gv, r, guu, guv, gvv, gur, gvr, rr]: [f32; SUMS], options: &FlowOptions) -> Self {
+    fn new([count, gu, gv, r, guu, guv, gvv, gur, gvr, rr]: [f32; SUMS], area: f32, noise: f32) -> Self {
         let n = 1.0 / count.max(1e-6);
         let (gu, gv, r) = (gu * n, gv * n, r * n);
         let g = [guu * n - gu * gu, guv * n - gu * gv, gvv * n - gv * gv];
         let b = [gur * n - gu * r, gvr * n - gv * r];
         // A little of the noise on the diagonal keeps the step finite without texture.
-        let floor = 0.05 * options.noise_floor * options.noise_floor;
+        let floor = 0.05 * noise * noise;
         let (uu, vv) = (g[0] + floor, g[2] + floor);
         let det = uu * vv - g[1] * g[1];
         let step = [-(vv * b[0] - g[1] * b[1]) / det, -(uu * b[1] - g[1] * b[0]) / det];
         let residual = (rr * n - r * r + step[0] * b[0] + step[1] * b[1]).max(0.0);
-        let pixels = count * options.correlation_area_px();
-        Self { coverage: count, pixels, g, step, residual }
+        Self { coverage: count, pixels: count * area, g, step, residual }
     }
 
     /// The displacement after this step.
@@ -175,7 +172,7 @@ impl Window {
         let (half, difference) = (0.5 * (cov[0] + cov[2]), 0.5 * (cov[0] - cov[2]));
         let largest = half + difference.hypot(cov[1]);
         let trusted = self.coverage >= MIN_COVERAGE
-            && least > MIN_TEXTURE * noise
+            && least > options.min_texture * noise
             && largest <= options.max_sigma_px * options.max_sigma_px
             && self.residual <= options.max_residual * options.max_residual
             && self.step[0].abs().max(self.step[1].abs()) <= MAX_LAST_STEP_PX;
