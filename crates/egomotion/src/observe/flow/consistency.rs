@@ -14,7 +14,7 @@ pub(super) fn reject(flow: &mut FlowField, backward: &Displacement, level: usize
             let (tx, ty) = ((x as f32 + u) / scale, (y as f32 + v) / scale);
             let du = u + scale * interpolate(&backward.u, tx, ty);
             let dv = v + scale * interpolate(&backward.v, tx, ty);
-            if !(du.hypot(dv) <= tolerance) {
+            if !(du * du + dv * dv <= tolerance * tolerance) {
                 flow.u.set(x, y, None);
                 flow.v.set(x, y, None);
                 for plane in [&mut flow.cov_uu, &mut flow.cov_uv, &mut flow.cov_vv] {

@@ -2,8 +2,9 @@
 //!
 //! Coarse to fine by dense inverse search ([`search`]: small patches, inverse-compositional, after
 //! Kroeger et al., ECCV 2016, made dense by photometric weights in [`densify`]), then a windowed
-//! Lucas–Kanade step per pixel at full resolution ([`refine`]) which gives the sub-pixel accuracy and
-//! the covariance. What backward flow contradicts ([`consistency`]) stays missing.
+//! Lucas–Kanade step per pixel ([`refine`]) which gives the sub-pixel accuracy and the covariance: at the
+//! level where the search ends, and at full resolution; where the latter has not enough texture the
+//! former's wider window answers ([`widen`]). What backward flow contradicts ([`consistency`]) stays missing.
 
 mod consistency;
 mod densify;
@@ -13,6 +14,7 @@ mod sampling;
 mod search;
 mod select;
 mod smooth;
+mod widen;
 mod window;
 
 pub use options::FlowOptions;
@@ -125,17 +127,28 @@ pub fn dense_flow(
         return Ok(FlowField::missing(size.0, size.1));
     }
 
-    let finest = options.finest_search_level.min(from.levels().len() - 1);
+    let coarsest = from.levels().len().min(to.levels().len()) - 1;
+    let finest = options.finest_search_level.min(coarsest);
     let found = coarse_to_fine(from, to, initial, finest, options);
-    let found = densify::enlarge(found, finest, size);
+    let wide = (finest > 0).then(|| {
+        let (a, b) = (&from.levels()[finest], &to.levels()[finest]);
+        refine::refine(a, b, finest, found.clone(), options)
+    });
+    let found = match &wide {
+        Some(wide) => densify::enlarge(widen::overlay(found, wide), finest, size),
+        None => found,
+    };
     let start = match initial {
         Some(prediction) => select::better(first, second, found, prediction, options),
         None => found,
     };
-    let mut flow = refine::refine(first, second, start, options);
+    let mut flow = refine::refine(first, second, 0, start, options);
+    if let Some(wide) = &wide {
+        widen::widen(&mut flow, wide, finest);
+    }
 
     if options.consistency_px.is_finite() {
-        let coarse = options.consistency_level.min(from.levels().len() - 1);
+        let coarse = options.consistency_level.min(coarsest);
         let reverse = initial.map(consistency::reverse);
         let backward = coarse_to_fine(to, from, reverse.as_ref(), coarse, options);
         consistency::reject(&mut flow, &backward, coarse, options.consistency_px);

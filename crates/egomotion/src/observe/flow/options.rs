@@ -13,7 +13,8 @@ pub struct FlowOptions {
     pub search_iterations: usize,
     /// How often a patch tries what its four neighbours found.
     pub propagation_rounds: usize,
-    /// Level at which the search ends (0: full resolution); the refinement takes it from there.
+    /// Level at which the search ends (0: full resolution) and the refinement begins; its answer there
+    /// stands in where full resolution has not enough texture.
     pub finest_search_level: usize,
     /// Coarsest level at which the initial flow takes part in the search.
     pub initial_level: usize,
@@ -50,9 +51,9 @@ impl Default for FlowOptions {
             finest_search_level: 1,
             initial_level: 2,
             window_radius_px: 4,
-            refine_iterations: 3,
+            refine_iterations: 2,
             noise_floor: 0.7,
-            sigma_floor_px: 0.02,
+            sigma_floor_px: 0.035,
             max_sigma_px: 0.5,
             min_texture: 1.0,
             max_residual: 25.0,

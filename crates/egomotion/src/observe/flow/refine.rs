@@ -34,13 +34,26 @@ const MISSING: Answer = Answer { u: f32::NAN, v: f32::NAN, cov: [f32::NAN; 3] };
 /// What is summed over the window: count, g, r, g gᵀ, g r, r².
 const SUMS: usize = 10;
 
-/// Refine a displacement at every pixel, and give its covariance.
+/// How much more the noise of a pyramid's coarser levels weighs in means over a window than in single
+/// pixels: the binomial filter leaves neighbours correlated by (28/70, 1/70) at the lags 1 and 2 after
+/// decimation, so (1 + 2 × 29/70)² in two dimensions.
+const PYRAMID_CORRELATION: f32 = (1.0 + 58.0 / 70.0) * (1.0 + 58.0 / 70.0);
+
+/// Refine a displacement at every pixel of a pyramid's level (everything in pixels of that level), and
+/// give its covariance.
 ///
 /// With g the gradient of `from` and r the difference after the (smoothed) displacement so far, the step
 /// is −G⁻¹ Σ (g − ḡ) r, where G = Σ (g − ḡ)(g − ḡ)ᵀ over the weighted window: Lucas–Kanade with a free
 /// brightness offset. The covariance is σ² G⁻¹ / n with σ² the window's variance of r after the step (at
 /// least the floor) and n = (Σw)²/Σw² the number of pixels the weighted window is worth.
-pub(super) fn refine(from: &Image, to: &Image, start: Displacement, options: &FlowOptions) -> FlowField {
+pub(super) fn refine(
+    from: &Image,
+    to: &Image,
+    level: usize,
+    start: Displacement,
+    options: &FlowOptions,
+) -> FlowField {
+    let correlation = if level == 0 { 1.0 } else { PYRAMID_CORRELATION };
     let (width, height) = from.size();
     let slopes = gradients(from);
     let weights = options.window_weights();
@@ -59,7 +72,8 @@ pub(super) fn refine(from: &Image, to: &Image, start: Displacement, options: &Fl
                 for (x, answer) in out.iter_mut().enumerate() {
                     let at = (before.u.at(x, y), before.v.at(x, y));
                     let window = Window::new(std::array::from_fn(|i| sums[i][x]), area, options.noise_floor);
-                    *answer = if is_last { window.answer(at, options) } else { window.step_from(at) };
+                    *answer =
+                        if is_last { window.answer(at, correlation, options) } else { window.step_from(at) };
                 }
             },
         );
@@ -150,7 +164,7 @@ impl Window {
     }
 
     /// The displacement after this last step with its covariance, or nothing if it cannot be trusted.
-    fn answer(&self, (u, v): (f32, f32), options: &FlowOptions) -> Answer {
+    fn answer(&self, (u, v): (f32, f32), correlation: f32, options: &FlowOptions) -> Answer {
         // Three unknowns (two components and the offset) have been fitted.
         let pixels = self.pixels.max(4.0);
         let floor = options.noise_floor * options.noise_floor;
@@ -160,7 +174,7 @@ impl Window {
         let (uu, uv, vv) = (self.g[0] - noise, self.g[1], self.g[2] - noise);
         let det = uu * vv - uv * uv;
         // G⁻¹ (G + noise) G⁻¹: the noise of the gradients multiplies that of the difference.
-        let scale = variance * hidden_noise((u, v)) / (pixels * det);
+        let scale = variance * correlation * hidden_noise((u, v)) / (pixels * det);
         let [iuu, iuv, ivv] = [vv / det, -uv / det, uu / det];
         let extra = options.sigma_floor_px * options.sigma_floor_px;
         let cov = [
@@ -168,9 +182,9 @@ impl Window {
             scale * (-uv + noise * iuv * (iuu + ivv) * det),
             scale * (uu + noise * (ivv * ivv + iuv * iuv) * det) + extra,
         ];
-        let least = 0.5 * (uu + vv) - (0.5 * (uu - vv)).hypot(uv);
+        let least = 0.5 * (uu + vv - ((uu - vv) * (uu - vv) + 4.0 * uv * uv).sqrt());
         let (half, difference) = (0.5 * (cov[0] + cov[2]), 0.5 * (cov[0] - cov[2]));
-        let largest = half + difference.hypot(cov[1]);
+        let largest = half + (difference * difference + cov[1] * cov[1]).sqrt();
         let trusted = self.coverage >= MIN_COVERAGE
             && least > options.min_texture * noise
             && largest <= options.max_sigma_px * options.max_sigma_px
