@@ -1,28 +1,26 @@
 //! Forward and backward flow must undo each other.
 
 use super::sampling::interpolate;
-use super::{Displacement, FlowField};
+use super::{Answer, Displacement, FlowField};
+use crate::geometry::Grid;
+use rayon::prelude::*;
 
 /// Drop what the `backward` flow (in pixels of its level) does not bring back to within `tolerance`
-/// pixels of where it began, or what leaves the image.
-pub(super) fn reject(flow: &mut FlowField, backward: &Displacement, level: usize, tolerance: f32) {
-    let (width, height) = flow.size();
+/// pixels of where it began.
+pub(super) fn reject(flow: &mut Grid<Answer>, backward: &Displacement, level: usize, tolerance: f32) {
+    let width = flow.width();
     let scale = (1_usize << level) as f32;
-    for y in 0..height {
-        for x in 0..width {
-            let (Some(u), Some(v)) = (flow.u.get(x, y), flow.v.get(x, y)) else { continue };
-            let (tx, ty) = ((x as f32 + u) / scale, (y as f32 + v) / scale);
-            let du = u + scale * interpolate(&backward.u, tx, ty);
-            let dv = v + scale * interpolate(&backward.v, tx, ty);
-            if !(du * du + dv * dv <= tolerance * tolerance) {
-                flow.u.set(x, y, None);
-                flow.v.set(x, y, None);
-                for plane in [&mut flow.cov_uu, &mut flow.cov_uv, &mut flow.cov_vv] {
-                    plane.set(x, y, f32::NAN);
-                }
+    flow.values_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        for (x, answer) in row.iter_mut().enumerate().filter(|(_, answer)| !answer.u.is_nan()) {
+            let (tx, ty) = ((x as f32 + answer.u) / scale, (y as f32 + answer.v) / scale);
+            let du = answer.u + scale * interpolate(&backward.u, tx, ty);
+            let dv = answer.v + scale * interpolate(&backward.v, tx, ty);
+            let agrees = du * du + dv * dv <= tolerance * tolerance;
+            if !agrees {
+                *answer = Answer::MISSING;
             }
         }
-    }
+    });
 }
 
 /// The same motion seen from the second image: −flow, put where it leads to.
@@ -53,7 +51,7 @@ pub(super) fn reverse(flow: &FlowField) -> FlowField {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Field, Grid};
+    use crate::geometry::Field;
 
     #[test]
     fn the_reverse_leads_back_and_keeps_the_nearer() {
@@ -70,12 +68,10 @@ mod tests {
 
     #[test]
     fn what_is_not_brought_back_is_dropped() {
-        let ones = Field::from_grid(Grid::filled(8, 8, 2.0));
-        let mut flow = FlowField::prediction(ones.clone(), ones);
+        let mut flow = Grid::filled(8, 8, Answer { u: 2.0, v: 2.0, cov: [1.0; 3] });
         let back = Grid::from_fn(4, 4, |x, _| if x < 2 { -1.0 } else { 1.0 });
         reject(&mut flow, &Displacement { u: back, v: Grid::filled(4, 4, -1.0) }, 1, 0.5);
-        assert_eq!(flow.u.get(0, 3), Some(2.0));
-        assert_eq!((flow.u.get(4, 3), flow.v.get(4, 3)), (None, None));
-        assert!(flow.cov_uu.at(4, 3).is_nan());
+        assert_eq!(flow.at(0, 3).u, 2.0);
+        assert!(flow.at(4, 3).u.is_nan() && flow.at(4, 3).cov[0].is_nan());
     }
 }

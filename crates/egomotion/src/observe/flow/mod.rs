@@ -1,10 +1,10 @@
 //! Dense optical flow with its covariance.
 //!
-//! Coarse to fine by dense inverse search ([`search`]: small patches, inverse-compositional, after
-//! Kroeger et al., ECCV 2016, made dense by photometric weights in [`densify`]), then a windowed
-//! Lucas–Kanade step per pixel ([`refine`]) which gives the sub-pixel accuracy and the covariance: at the
+//! Coarse to fine by dense inverse search (`search`: small patches, inverse-compositional, after
+//! Kroeger et al., ECCV 2016, made dense by photometric weights in `densify`), then a windowed
+//! Lucas–Kanade step per pixel (`refine`) which gives the sub-pixel accuracy and the covariance: at the
 //! level where the search ends, and at full resolution; where the latter has not enough texture the
-//! former's wider window answers ([`widen`]). What backward flow contradicts ([`consistency`]) stays missing.
+//! former's wider window answers (`widen`). What backward flow contradicts (`consistency`) stays missing.
 
 mod consistency;
 mod densify;
@@ -94,6 +94,36 @@ struct Displacement {
     v: Grid<f32>,
 }
 
+/// A pixel's displacement with its covariance (uu, uv, vv), all NaN where missing.
+#[derive(Debug, Clone, Copy)]
+struct Answer {
+    u: f32,
+    v: f32,
+    cov: [f32; 3],
+}
+
+impl Answer {
+    const MISSING: Self = Self { u: f32::NAN, v: f32::NAN, cov: [f32::NAN; 3] };
+}
+
+impl FlowField {
+    fn from_answers(answers: &Grid<Answer>) -> Self {
+        let (width, height) = answers.size();
+        let plane = |f: fn(&Answer) -> f32| {
+            let mut plane = Grid::filled(width, height, f32::NAN);
+            plane.values_mut().iter_mut().zip(answers.values()).for_each(|(p, a)| *p = f(a));
+            plane
+        };
+        Self {
+            u: Field::from_grid(plane(|a| a.u)),
+            v: Field::from_grid(plane(|a| a.v)),
+            cov_uu: plane(|a| a.cov[0]),
+            cov_uv: plane(|a| a.cov[1]),
+            cov_vv: plane(|a| a.cov[2]),
+        }
+    }
+}
+
 /// Flow of `from` to `to`, on the pixel grid of `from`, displacement (to − from) in pixels.
 ///
 /// `initial` predicts the flow at some or all pixels (for example from rigid motion and disparity). It
@@ -153,7 +183,7 @@ pub fn dense_flow(
         let backward = coarse_to_fine(to, from, reverse.as_ref(), coarse, options);
         consistency::reject(&mut flow, &backward, coarse, options.consistency_px);
     }
-    Ok(flow)
+    Ok(FlowField::from_answers(&flow))
 }
 
 /// Dense inverse search from the coarsest level both pyramids have down to level `finest`; the

@@ -3,8 +3,8 @@
 use super::sampling::{cubic, cubic_weights};
 use super::smooth::smooth;
 use super::window::{Rows, window_sums};
-use super::{Displacement, FlowField, FlowOptions};
-use crate::geometry::{Field, Grid, Image};
+use super::{Answer, Displacement, FlowOptions};
+use crate::geometry::{Grid, Image};
 use crate::observe::pyramid::{GRADIENT_NOISE_GAIN, Gradients, gradients};
 
 /// Share of the window that must have a counterpart in the second image.
@@ -20,16 +20,6 @@ fn hidden_noise((u, v): (f32, f32)) -> f32 {
     let kept = |d: f32| cubic_weights(d - d.floor()).iter().map(|w| w * w).sum::<f32>();
     2.0 / (1.0 + kept(u) * kept(v))
 }
-
-/// A pixel's answer: displacement and covariance, NaN where missing.
-#[derive(Clone, Copy)]
-struct Answer {
-    u: f32,
-    v: f32,
-    cov: [f32; 3],
-}
-
-const MISSING: Answer = Answer { u: f32::NAN, v: f32::NAN, cov: [f32::NAN; 3] };
 
 /// What is summed over the window: count, g, r, g gᵀ, g r, r².
 const SUMS: usize = 10;
@@ -52,13 +42,13 @@ pub(super) fn refine(
     level: usize,
     start: Displacement,
     options: &FlowOptions,
-) -> FlowField {
+) -> Grid<Answer> {
     let correlation = if level == 0 { 1.0 } else { PYRAMID_CORRELATION };
     let (width, height) = from.size();
     let slopes = gradients(from);
     let weights = options.window_weights();
     let area = options.correlation_area_px();
-    let mut answers = vec![MISSING; width * height];
+    let mut answers = Grid::filled(width, height, Answer::MISSING);
     let mut flow = start;
     for iteration in 1..=options.refine_iterations {
         let before = smooth(&flow);
@@ -66,7 +56,7 @@ pub(super) fn refine(
         window_sums::<SUMS, Answer>(
             (width, height),
             &weights,
-            &mut answers,
+            answers.values_mut(),
             |y, rows| products(from, to, &slopes, &before, y, rows),
             |y, sums, out| {
                 for (x, answer) in out.iter_mut().enumerate() {
@@ -78,22 +68,12 @@ pub(super) fn refine(
             },
         );
         if !is_last {
-            for ((u, v), a) in flow.u.values_mut().iter_mut().zip(flow.v.values_mut()).zip(&answers) {
+            for ((u, v), a) in flow.u.values_mut().iter_mut().zip(flow.v.values_mut()).zip(answers.values()) {
                 (*u, *v) = (a.u, a.v);
             }
         }
     }
-    let plane = |f: fn(&Answer) -> f32| {
-        Grid::from_values(width, height, answers.iter().map(f).collect())
-            .unwrap_or_else(|| Grid::filled(width, height, f32::NAN))
-    };
-    FlowField {
-        u: Field::from_grid(plane(|a| a.u)),
-        v: Field::from_grid(plane(|a| a.v)),
-        cov_uu: plane(|a| a.cov[0]),
-        cov_uv: plane(|a| a.cov[1]),
-        cov_vv: plane(|a| a.cov[2]),
-    }
+    answers
 }
 
 /// Write what is to be summed of row `y`; zeros where the displacement leaves the second image.
@@ -191,7 +171,7 @@ impl Window {
             && self.residual <= options.max_residual * options.max_residual
             && self.step[0].abs().max(self.step[1].abs()) <= MAX_LAST_STEP_PX;
         if !trusted {
-            return MISSING;
+            return Answer::MISSING;
         }
         Answer { u: u + self.step[0], v: v + self.step[1], cov }
     }
