@@ -123,7 +123,7 @@ fn noise_free_motion_is_found_to_a_twentieth_of_a_pixel() {
 #[test]
 fn noise_costs_little_and_the_covariance_says_how_much() {
     for motion in [Motion::shift(0.5, -0.25), Motion::shift(-3.3, 2.6), ROTATION_AND_ZOOM] {
-        for noise in [2.0, 4.0] {
+        for noise in [2.0, 4.0, 8.0] {
             let (density, error, scores) = judge(&flow_of(images(2, motion, noise, 0.0), None), motion);
             assert!(density > 0.8 && error <= 0.05 * noise);
             assert!(scores.iter().all(|s| (0.7..=1.4).contains(s)), "{scores:?}");

@@ -17,7 +17,7 @@ pub(super) fn reject(flow: &mut Grid<Answer>, backward: &Displacement, level: us
             let dv = answer.v + scale * interpolate(&backward.v, tx, ty);
             let agrees = du * du + dv * dv <= tolerance * tolerance;
             if !agrees {
-                *answer = Answer::MISSING;
+                *answer = Answer::REFUTED;
             }
         }
     });

@@ -94,7 +94,8 @@ struct Displacement {
     v: Grid<f32>,
 }
 
-/// A pixel's displacement with its covariance (uu, uv, vv), all NaN where missing.
+/// A pixel's displacement with its covariance (uu, uv, vv); without an answer all of it is NaN, or the
+/// covariance infinite.
 #[derive(Debug, Clone, Copy)]
 struct Answer {
     u: f32,
@@ -103,7 +104,10 @@ struct Answer {
 }
 
 impl Answer {
-    const MISSING: Self = Self { u: f32::NAN, v: f32::NAN, cov: [f32::NAN; 3] };
+    /// Nothing is known, for want of texture: a wider window may know more.
+    const UNKNOWN: Self = Self { u: f32::NAN, v: f32::NAN, cov: [f32::INFINITY; 3] };
+    /// What was found has been refuted.
+    const REFUTED: Self = Self { u: f32::NAN, v: f32::NAN, cov: [f32::NAN; 3] };
 }
 
 impl FlowField {
@@ -111,7 +115,8 @@ impl FlowField {
         let (width, height) = answers.size();
         let plane = |f: fn(&Answer) -> f32| {
             let mut plane = Grid::filled(width, height, f32::NAN);
-            plane.values_mut().iter_mut().zip(answers.values()).for_each(|(p, a)| *p = f(a));
+            let known = plane.values_mut().iter_mut().zip(answers.values()).filter(|(_, a)| !a.u.is_nan());
+            known.for_each(|(p, a)| *p = f(a));
             plane
         };
         Self {
@@ -164,10 +169,7 @@ pub fn dense_flow(
         let (a, b) = (&from.levels()[finest], &to.levels()[finest]);
         refine::refine(a, b, finest, found.clone(), options)
     });
-    let found = match &wide {
-        Some(wide) => densify::enlarge(widen::overlay(found, wide), finest, size),
-        None => found,
-    };
+    let found = densify::enlarge(found, finest, size);
     let start = match initial {
         Some(prediction) => select::better(first, second, found, prediction, options),
         None => found,

@@ -56,7 +56,7 @@ impl Default for FlowOptions {
             sigma_floor_px: 0.035,
             max_sigma_px: 0.5,
             min_texture: 1.0,
-            max_residual: 25.0,
+            max_residual: 15.0,
             consistency_px: 1.5,
             consistency_level: 1,
         }
@@ -89,9 +89,10 @@ impl FlowOptions {
         weights.into_iter().map(|w| w / sum).collect()
     }
 
-    /// Number of neighbouring pixels that share one independent error, (Σw)²/Σw² of the window: the sum
-    /// of the autocorrelation of the flow's error. Who sums over pixels as if they were independent
-    /// makes the covariance of the sum too small by this factor.
+    /// Number of full-resolution pixels that share one independent error, (Σw)²/Σw² of the window: the
+    /// sum of the autocorrelation of the flow's error. Who sums over pixels as if they were independent
+    /// makes the covariance of the sum too small by about this factor, and by 4 to the power of
+    /// `finest_search_level` more where the wider window has answered.
     pub fn correlation_area_px(&self) -> f32 {
         let squares: f32 = self.window_weights().iter().map(|w| w * w).sum();
         1.0 / (squares * squares)

@@ -48,7 +48,7 @@ pub(super) fn refine(
     let slopes = gradients(from);
     let weights = options.window_weights();
     let area = options.correlation_area_px();
-    let mut answers = Grid::filled(width, height, Answer::MISSING);
+    let mut answers = Grid::filled(width, height, Answer::UNKNOWN);
     let mut flow = start;
     for iteration in 1..=options.refine_iterations {
         let before = smooth(&flow);
@@ -165,13 +165,16 @@ impl Window {
         let least = 0.5 * (uu + vv - ((uu - vv) * (uu - vv) + 4.0 * uv * uv).sqrt());
         let (half, difference) = (0.5 * (cov[0] + cov[2]), 0.5 * (cov[0] - cov[2]));
         let largest = half + (difference * difference + cov[1] * cov[1]).sqrt();
-        let trusted = self.coverage >= MIN_COVERAGE
-            && least > options.min_texture * noise
-            && largest <= options.max_sigma_px * options.max_sigma_px
+        let is_textured =
+            least > options.min_texture * noise && largest <= options.max_sigma_px * options.max_sigma_px;
+        if !is_textured {
+            return Answer::UNKNOWN;
+        }
+        let matches = self.coverage >= MIN_COVERAGE
             && self.residual <= options.max_residual * options.max_residual
             && self.step[0].abs().max(self.step[1].abs()) <= MAX_LAST_STEP_PX;
-        if !trusted {
-            return Answer::MISSING;
+        if !matches {
+            return Answer::REFUTED;
         }
         Answer { u: u + self.step[0], v: v + self.step[1], cov }
     }
