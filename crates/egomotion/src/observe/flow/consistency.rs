@@ -23,7 +23,8 @@ pub(super) fn reject(flow: &mut Grid<Answer>, backward: &Displacement, level: us
     });
 }
 
-/// The same motion seen from the second image: −flow, put where it leads to.
+/// The same motion seen from the second image: −flow, put on the four pixels around where it leads to, so
+/// that what comes nearer leaves no gaps.
 ///
 /// Where two pixels arrive at one, the longer displacement stays: what is nearer moves more, and hides
 /// what is behind.
@@ -33,15 +34,19 @@ pub(super) fn reverse(flow: &FlowField) -> FlowField {
     for y in 0..height {
         for x in 0..width {
             let (Some(u), Some(v)) = (flow.u.get(x, y), flow.v.get(x, y)) else { continue };
-            let (tx, ty) = ((x as f32 + u).round(), (y as f32 + v).round());
-            if !(tx >= 0.0 && ty >= 0.0 && tx < width as f32 && ty < height as f32) {
-                continue;
-            }
-            let (tx, ty) = (tx as usize, ty as usize);
-            let length = |u: Option<f32>, v: Option<f32>| u.zip(v).map_or(-1.0, |(u, v)| u.hypot(v));
-            if u.hypot(v) > length(back.u.get(tx, ty), back.v.get(tx, ty)) {
-                back.u.set(tx, ty, Some(-u));
-                back.v.set(tx, ty, Some(-v));
+            let (tx, ty) = (x as f32 + u, y as f32 + v);
+            let corners = [(tx.floor(), ty.floor()), (tx.ceil(), ty.floor()), (tx.floor(), ty.ceil())];
+            for (tx, ty) in corners.into_iter().chain([(tx.ceil(), ty.ceil())]) {
+                let is_inside = tx >= 0.0 && ty >= 0.0 && tx < width as f32 && ty < height as f32;
+                if !is_inside {
+                    continue;
+                }
+                let (tx, ty) = (tx as usize, ty as usize);
+                let stays = back.u.get(tx, ty).zip(back.v.get(tx, ty));
+                if stays.is_none_or(|(a, b)| u * u + v * v > a * a + b * b) {
+                    back.u.set(tx, ty, Some(-u));
+                    back.v.set(tx, ty, Some(-v));
+                }
             }
         }
     }
@@ -63,7 +68,8 @@ mod tests {
         }
         let back = reverse(&FlowField::prediction(u, v));
         assert_eq!((back.u.get(5, 2), back.v.get(5, 2)), (Some(-4.2), Some(-1.0)));
-        assert_eq!(back.u.count(), 1);
+        assert_eq!(back.u.get(6, 2), Some(-4.2));
+        assert_eq!(back.u.count(), 2);
     }
 
     #[test]
