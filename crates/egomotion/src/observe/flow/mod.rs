@@ -7,6 +7,7 @@
 //! former's wider window answers (`widen`). What backward flow contradicts (`consistency`) stays missing.
 
 mod consistency;
+mod correlation;
 mod densify;
 mod options;
 mod refine;
@@ -167,14 +168,14 @@ pub fn dense_flow(
     let found = coarse_to_fine(from, to, initial, finest, options);
     let wide = (finest > 0).then(|| {
         let (a, b) = (&from.levels()[finest], &to.levels()[finest]);
-        refine::refine(a, b, finest, found.clone(), options)
+        refine::refine(a, b, found.clone(), options)
     });
     let found = densify::enlarge(found, finest, size);
     let start = match initial {
         Some(prediction) => select::better(first, second, found, prediction, options),
         None => found,
     };
-    let mut flow = refine::refine(first, second, 0, start, options);
+    let mut flow = refine::refine(first, second, start, options);
     if let Some(wide) = &wide {
         widen::widen(&mut flow, wide, finest);
     }

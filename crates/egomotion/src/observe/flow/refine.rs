@@ -1,6 +1,7 @@
 //! Lucas–Kanade at full resolution: sub-pixel accuracy, and the covariance.
 
-use super::sampling::{cubic, cubic_weights};
+use super::correlation::variance_factor;
+use super::sampling::cubic;
 use super::smooth::smooth;
 use super::window::{Rows, window_sums};
 use super::{Answer, Displacement, FlowOptions};
@@ -14,20 +15,8 @@ const MAX_LAST_STEP_PX: f32 = 0.5;
 /// No step is longer than this, in pixels: the images are linear over little more.
 const MAX_STEP_PX: f32 = 1.0;
 
-/// Ratio of the variance that counts (of means over the window, which interpolation does not reduce) to
-/// that of single differences, of which interpolation at the fractions of a displacement averages a part.
-fn hidden_noise((u, v): (f32, f32)) -> f32 {
-    let kept = |d: f32| cubic_weights(d - d.floor()).iter().map(|w| w * w).sum::<f32>();
-    2.0 / (1.0 + kept(u) * kept(v))
-}
-
 /// What is summed over the window: count, g, r, g gᵀ, g r, r².
 const SUMS: usize = 10;
-
-/// How much more the noise of a pyramid's coarser levels weighs in means over a window than in single
-/// pixels: the binomial filter leaves neighbours correlated by (28/70, 1/70) at the lags 1 and 2 after
-/// decimation, so (1 + 2 × 29/70)² in two dimensions.
-const PYRAMID_CORRELATION: f32 = (1.0 + 58.0 / 70.0) * (1.0 + 58.0 / 70.0);
 
 /// Refine a displacement at every pixel of a pyramid's level (everything in pixels of that level), and
 /// give its covariance.
@@ -35,15 +24,9 @@ const PYRAMID_CORRELATION: f32 = (1.0 + 58.0 / 70.0) * (1.0 + 58.0 / 70.0);
 /// With g the gradient of `from` and r the difference after the (smoothed) displacement so far, the step
 /// is −G⁻¹ Σ (g − ḡ) r, where G = Σ (g − ḡ)(g − ḡ)ᵀ over the weighted window: Lucas–Kanade with a free
 /// brightness offset. The covariance is σ² G⁻¹ / n with σ² the window's variance of r after the step (at
-/// least the floor) and n = (Σw)²/Σw² the number of pixels the weighted window is worth.
-pub(super) fn refine(
-    from: &Image,
-    to: &Image,
-    level: usize,
-    start: Displacement,
-    options: &FlowOptions,
-) -> Grid<Answer> {
-    let correlation = if level == 0 { 1.0 } else { PYRAMID_CORRELATION };
+/// least the floor) and n = (Σw)²/Σw² the number of pixels the weighted window is worth, enlarged by what
+/// [`variance_factor`] finds neighbours to have in common.
+pub(super) fn refine(from: &Image, to: &Image, start: Displacement, options: &FlowOptions) -> Grid<Answer> {
     let (width, height) = from.size();
     let slopes = gradients(from);
     let weights = options.window_weights();
@@ -53,6 +36,7 @@ pub(super) fn refine(
     for iteration in 1..=options.refine_iterations {
         let before = smooth(&flow);
         let is_last = iteration == options.refine_iterations;
+        let factor = if is_last { variance_factor(from, to, &slopes, &before) } else { 1.0 };
         window_sums::<SUMS, Answer>(
             (width, height),
             &weights,
@@ -62,8 +46,7 @@ pub(super) fn refine(
                 for (x, answer) in out.iter_mut().enumerate() {
                     let at = (before.u.at(x, y), before.v.at(x, y));
                     let window = Window::new(std::array::from_fn(|i| sums[i][x]), area, options.noise_floor);
-                    *answer =
-                        if is_last { window.answer(at, correlation, options) } else { window.step_from(at) };
+                    *answer = if is_last { window.answer(at, factor, options) } else { window.step_from(at) };
                 }
             },
         );
@@ -144,7 +127,7 @@ impl Window {
     }
 
     /// The displacement after this last step with its covariance, or nothing if it cannot be trusted.
-    fn answer(&self, (u, v): (f32, f32), correlation: f32, options: &FlowOptions) -> Answer {
+    fn answer(&self, (u, v): (f32, f32), factor: f32, options: &FlowOptions) -> Answer {
         // Three unknowns (two components and the offset) have been fitted.
         let pixels = self.pixels.max(4.0);
         let floor = options.noise_floor * options.noise_floor;
@@ -154,7 +137,7 @@ impl Window {
         let (uu, uv, vv) = (self.g[0] - noise, self.g[1], self.g[2] - noise);
         let det = uu * vv - uv * uv;
         // G⁻¹ (G + noise) G⁻¹: the noise of the gradients multiplies that of the difference.
-        let scale = variance * correlation * hidden_noise((u, v)) / (pixels * det);
+        let scale = variance * factor / (pixels * det);
         let [iuu, iuv, ivv] = [vv / det, -uv / det, uu / det];
         let extra = options.sigma_floor_px * options.sigma_floor_px;
         let cov = [

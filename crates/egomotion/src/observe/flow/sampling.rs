@@ -16,8 +16,7 @@ pub(super) fn interpolate(plane: &Grid<f32>, x: f32, y: f32) -> f32 {
 }
 
 /// Catmull–Rom weights of the four pixels around a fraction t of 0 … 1.
-#[inline]
-pub(super) fn cubic_weights(t: f32) -> [f32; 4] {
+fn cubic_weights(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [
         0.5 * (-t3 + 2.0 * t2 - t),
