@@ -132,6 +132,27 @@ fn noise_costs_little_and_the_covariance_says_how_much() {
 }
 
 #[test]
+fn the_covariance_notices_noise_that_neighbours_share() {
+    let motion = Motion::shift(-3.3, 2.6);
+    let mut pair = images(7, motion, 0.0, 0.0);
+    let mut random = Pcg64Mcg::seed_from_u64(8);
+    let normal = Normal::new(0.0, 8.0).unwrap();
+    for image in &mut pair {
+        let white: Image = Grid::from_fn(SIZE.0 + 2, SIZE.1 + 2, |_, _| normal.sample(&mut random) as f32);
+        for v in 0..SIZE.1 {
+            for u in 0..SIZE.0 {
+                let at =
+                    |i: usize, j: usize| [1.0, 2.0, 1.0][i] * [1.0, 2.0, 1.0][j] * white.at(u + i, v + j);
+                let noise: f32 = (0..9).map(|k| at(k % 3, k / 3)).sum::<f32>() / 16.0;
+                image.set(u, v, image.at(u, v) + noise);
+            }
+        }
+    }
+    let (density, _, scores) = judge(&flow_of(pair, None), motion);
+    assert!(density > 0.8 && scores.iter().all(|s| (0.7..=1.4).contains(s)), "{scores:?}");
+}
+
+#[test]
 fn large_displacement_is_found() {
     let motion = Motion::shift(25.0, -6.4);
     let (density, error, _) = judge(&flow_of(images(3, motion, 2.0, 0.0), None), motion);

@@ -54,7 +54,7 @@ impl Default for FlowOptions {
             refine_iterations: 2,
             noise_floor: 0.7,
             sigma_floor_px: 0.035,
-            max_sigma_px: 0.5,
+            max_sigma_px: 0.7,
             min_texture: 1.0,
             max_residual: 15.0,
             consistency_px: 1.5,
