@@ -123,12 +123,33 @@ fn noise_free_motion_is_found_to_a_twentieth_of_a_pixel() {
 #[test]
 fn noise_costs_little_and_the_covariance_says_how_much() {
     for motion in [Motion::shift(0.5, -0.25), Motion::shift(-3.3, 2.6), ROTATION_AND_ZOOM] {
-        for noise in [2.0, 4.0] {
+        for noise in [2.0, 4.0, 8.0] {
             let (density, error, scores) = judge(&flow_of(images(2, motion, noise, 0.0), None), motion);
             assert!(density > 0.8 && error <= 0.05 * noise);
             assert!(scores.iter().all(|s| (0.7..=1.4).contains(s)), "{scores:?}");
         }
     }
+}
+
+#[test]
+fn the_covariance_notices_noise_that_neighbours_share() {
+    let motion = Motion::shift(-3.3, 2.6);
+    let mut pair = images(7, motion, 0.0, 0.0);
+    let mut random = Pcg64Mcg::seed_from_u64(8);
+    let normal = Normal::new(0.0, 8.0).unwrap();
+    for image in &mut pair {
+        let white: Image = Grid::from_fn(SIZE.0 + 2, SIZE.1 + 2, |_, _| normal.sample(&mut random) as f32);
+        for v in 0..SIZE.1 {
+            for u in 0..SIZE.0 {
+                let at =
+                    |i: usize, j: usize| [1.0, 2.0, 1.0][i] * [1.0, 2.0, 1.0][j] * white.at(u + i, v + j);
+                let noise: f32 = (0..9).map(|k| at(k % 3, k / 3)).sum::<f32>() / 16.0;
+                image.set(u, v, image.at(u, v) + noise);
+            }
+        }
+    }
+    let (density, _, scores) = judge(&flow_of(pair, None), motion);
+    assert!(density > 0.8 && scores.iter().all(|s| (0.7..=1.4).contains(s)), "{scores:?}");
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! Dense optical flow with its covariance.
 //!
-//! Coarse to fine by dense inverse search ([`search`]: small patches, inverse-compositional, after
-//! Kroeger et al., ECCV 2016, made dense by photometric weights in [`densify`]), then a windowed
-//! Lucas–Kanade step per pixel at full resolution ([`refine`]) which gives the sub-pixel accuracy and
-//! the covariance. What backward flow contradicts ([`consistency`]) stays missing.
+//! Coarse to fine by dense inverse search (`search`: small patches, inverse-compositional, after
+//! Kroeger et al., ECCV 2016, made dense by photometric weights in `densify`), then a windowed
+//! Lucas–Kanade step per pixel (`refine`) which gives the sub-pixel accuracy and the covariance: at the
+//! level where the search ends, and at full resolution; where the latter has not enough texture the
+//! former's wider window answers (`widen`). What backward flow contradicts (`consistency`) stays missing.
 
 mod consistency;
+mod correlation;
 mod densify;
 mod options;
 mod refine;
@@ -13,6 +15,7 @@ mod sampling;
 mod search;
 mod select;
 mod smooth;
+mod widen;
 mod window;
 
 pub use options::FlowOptions;
@@ -92,6 +95,41 @@ struct Displacement {
     v: Grid<f32>,
 }
 
+/// A pixel's displacement with its covariance (uu, uv, vv); without an answer all of it is NaN, or the
+/// covariance infinite.
+#[derive(Debug, Clone, Copy)]
+struct Answer {
+    u: f32,
+    v: f32,
+    cov: [f32; 3],
+}
+
+impl Answer {
+    /// Nothing is known, for want of texture: a wider window may know more.
+    const UNKNOWN: Self = Self { u: f32::NAN, v: f32::NAN, cov: [f32::INFINITY; 3] };
+    /// What was found has been refuted.
+    const REFUTED: Self = Self { u: f32::NAN, v: f32::NAN, cov: [f32::NAN; 3] };
+}
+
+impl FlowField {
+    fn from_answers(answers: &Grid<Answer>) -> Self {
+        let (width, height) = answers.size();
+        let plane = |f: fn(&Answer) -> f32| {
+            let mut plane = Grid::filled(width, height, f32::NAN);
+            let known = plane.values_mut().iter_mut().zip(answers.values()).filter(|(_, a)| !a.u.is_nan());
+            known.for_each(|(p, a)| *p = f(a));
+            plane
+        };
+        Self {
+            u: Field::from_grid(plane(|a| a.u)),
+            v: Field::from_grid(plane(|a| a.v)),
+            cov_uu: plane(|a| a.cov[0]),
+            cov_uv: plane(|a| a.cov[1]),
+            cov_vv: plane(|a| a.cov[2]),
+        }
+    }
+}
+
 /// Flow of `from` to `to`, on the pixel grid of `from`, displacement (to − from) in pixels.
 ///
 /// `initial` predicts the flow at some or all pixels (for example from rigid motion and disparity). It
@@ -125,22 +163,30 @@ pub fn dense_flow(
         return Ok(FlowField::missing(size.0, size.1));
     }
 
-    let finest = options.finest_search_level.min(from.levels().len() - 1);
+    let coarsest = from.levels().len().min(to.levels().len()) - 1;
+    let finest = options.finest_search_level.min(coarsest);
     let found = coarse_to_fine(from, to, initial, finest, options);
+    let wide = (finest > 0).then(|| {
+        let (a, b) = (&from.levels()[finest], &to.levels()[finest]);
+        refine::refine(a, b, found.clone(), options)
+    });
     let found = densify::enlarge(found, finest, size);
     let start = match initial {
         Some(prediction) => select::better(first, second, found, prediction, options),
         None => found,
     };
     let mut flow = refine::refine(first, second, start, options);
+    if let Some(wide) = &wide {
+        widen::widen(&mut flow, wide, finest);
+    }
 
     if options.consistency_px.is_finite() {
-        let coarse = options.consistency_level.min(from.levels().len() - 1);
+        let coarse = options.consistency_level.min(coarsest);
         let reverse = initial.map(consistency::reverse);
         let backward = coarse_to_fine(to, from, reverse.as_ref(), coarse, options);
         consistency::reject(&mut flow, &backward, coarse, options.consistency_px);
     }
-    Ok(flow)
+    Ok(FlowField::from_answers(&flow))
 }
 
 /// Dense inverse search from the coarsest level both pyramids have down to level `finest`; the

@@ -13,7 +13,8 @@ pub struct FlowOptions {
     pub search_iterations: usize,
     /// How often a patch tries what its four neighbours found.
     pub propagation_rounds: usize,
-    /// Level at which the search ends (0: full resolution); the refinement takes it from there.
+    /// Level at which the search ends (0: full resolution) and the refinement begins; its answer there
+    /// stands in where full resolution has not enough texture.
     pub finest_search_level: usize,
     /// Coarsest level at which the initial flow takes part in the search.
     pub initial_level: usize,
@@ -29,6 +30,9 @@ pub struct FlowOptions {
     pub sigma_floor_px: f32,
     /// A pixel is missing if the larger semi-axis of its covariance exceeds this, in pixels.
     pub max_sigma_px: f32,
+    /// A pixel is missing if the gradient energy along the weakest direction of its window is not this
+    /// many times what noise of the size of the residual makes by itself.
+    pub min_texture: f32,
     /// A pixel is missing if the residual of its window exceeds this root mean square, in grey levels.
     pub max_residual: f32,
     /// A pixel is missing if forward and backward flow disagree by more than this, in pixels;
@@ -47,11 +51,12 @@ impl Default for FlowOptions {
             finest_search_level: 1,
             initial_level: 2,
             window_radius_px: 4,
-            refine_iterations: 3,
+            refine_iterations: 2,
             noise_floor: 0.7,
-            sigma_floor_px: 0.02,
-            max_sigma_px: 0.5,
-            max_residual: 25.0,
+            sigma_floor_px: 0.035,
+            max_sigma_px: 0.7,
+            min_texture: 1.0,
+            max_residual: 15.0,
             consistency_px: 1.5,
             consistency_level: 1,
         }
@@ -68,6 +73,7 @@ impl FlowOptions {
             (self.noise_floor > 0.0, "noise_floor must be positive"),
             (self.sigma_floor_px >= 0.0, "sigma_floor_px must not be negative"),
             (self.max_sigma_px > 0.0, "max_sigma_px must be positive"),
+            (self.min_texture >= 0.0, "min_texture must not be negative"),
             (self.max_residual > 0.0, "max_residual must be positive"),
             (self.consistency_px > 0.0, "consistency_px must be positive"),
         ];
@@ -83,9 +89,10 @@ impl FlowOptions {
         weights.into_iter().map(|w| w / sum).collect()
     }
 
-    /// Number of neighbouring pixels that share one independent error, (Σw)²/Σw² of the window: the sum
-    /// of the autocorrelation of the flow's error. Who sums over pixels as if they were independent
-    /// makes the covariance of the sum too small by this factor.
+    /// Number of full-resolution pixels that share one independent error, (Σw)²/Σw² of the window: the
+    /// sum of the autocorrelation of the flow's error. Who sums over pixels as if they were independent
+    /// makes the covariance of the sum too small by about this factor, and by 4 to the power of
+    /// `finest_search_level` more where the wider window has answered.
     pub fn correlation_area_px(&self) -> f32 {
         let squares: f32 = self.window_weights().iter().map(|w| w * w).sum();
         1.0 / (squares * squares)

@@ -1,10 +1,11 @@
 //! Lucas–Kanade at full resolution: sub-pixel accuracy, and the covariance.
 
-use super::sampling::{cubic, cubic_weights};
+use super::correlation::variance_factor;
+use super::sampling::cubic;
 use super::smooth::smooth;
 use super::window::{Rows, window_sums};
-use super::{Displacement, FlowField, FlowOptions};
-use crate::geometry::{Field, Grid, Image};
+use super::{Answer, Displacement, FlowOptions};
+use crate::geometry::{Grid, Image};
 use crate::observe::pyramid::{GRADIENT_NOISE_GAIN, Gradients, gradients};
 
 /// Share of the window that must have a counterpart in the second image.
@@ -14,74 +15,48 @@ const MAX_LAST_STEP_PX: f32 = 0.5;
 /// No step is longer than this, in pixels: the images are linear over little more.
 const MAX_STEP_PX: f32 = 1.0;
 
-/// Least ratio of a window's weakest gradient energy to what noise alone makes.
-const MIN_TEXTURE: f32 = 2.0;
-
-/// Ratio of the variance that counts (of means over the window, which interpolation does not reduce) to
-/// that of single differences, of which interpolation at the fractions of a displacement averages a part.
-fn hidden_noise((u, v): (f32, f32)) -> f32 {
-    let kept = |d: f32| cubic_weights(d - d.floor()).iter().map(|w| w * w).sum::<f32>();
-    2.0 / (1.0 + kept(u) * kept(v))
-}
-
-/// A pixel's answer: displacement and covariance, NaN where missing.
-#[derive(Clone, Copy)]
-struct Answer {
-    u: f32,
-    v: f32,
-    cov: [f32; 3],
-}
-
-const MISSING: Answer = Answer { u: f32::NAN, v: f32::NAN, cov: [f32::NAN; 3] };
-
 /// What is summed over the window: count, g, r, g gᵀ, g r, r².
 const SUMS: usize = 10;
 
-/// Refine a displacement at every pixel, and give its covariance.
+/// Refine a displacement at every pixel of a pyramid's level (everything in pixels of that level), and
+/// give its covariance.
 ///
 /// With g the gradient of `from` and r the difference after the (smoothed) displacement so far, the step
 /// is −G⁻¹ Σ (g − ḡ) r, where G = Σ (g − ḡ)(g − ḡ)ᵀ over the weighted window: Lucas–Kanade with a free
 /// brightness offset. The covariance is σ² G⁻¹ / n with σ² the window's variance of r after the step (at
-/// least the floor) and n = (Σw)²/Σw² the number of pixels the weighted window is worth.
-pub(super) fn refine(from: &Image, to: &Image, start: Displacement, options: &FlowOptions) -> FlowField {
+/// least the floor) and n = (Σw)²/Σw² the number of pixels the weighted window is worth, enlarged by what
+/// [`variance_factor`] finds neighbours to have in common.
+pub(super) fn refine(from: &Image, to: &Image, start: Displacement, options: &FlowOptions) -> Grid<Answer> {
     let (width, height) = from.size();
     let slopes = gradients(from);
     let weights = options.window_weights();
-    let mut answers = vec![MISSING; width * height];
+    let area = options.correlation_area_px();
+    let mut answers = Grid::filled(width, height, Answer::UNKNOWN);
     let mut flow = start;
     for iteration in 1..=options.refine_iterations {
         let before = smooth(&flow);
         let is_last = iteration == options.refine_iterations;
+        let factor = if is_last { variance_factor(from, to, &slopes, &before) } else { 1.0 };
         window_sums::<SUMS, Answer>(
             (width, height),
             &weights,
-            &mut answers,
+            answers.values_mut(),
             |y, rows| products(from, to, &slopes, &before, y, rows),
             |y, sums, out| {
                 for (x, answer) in out.iter_mut().enumerate() {
                     let at = (before.u.at(x, y), before.v.at(x, y));
-                    let window = Window::new(std::array::from_fn(|i| sums[i][x]), options);
-                    *answer = if is_last { window.answer(at, options) } else { window.step_from(at) };
+                    let window = Window::new(std::array::from_fn(|i| sums[i][x]), area, options.noise_floor);
+                    *answer = if is_last { window.answer(at, factor, options) } else { window.step_from(at) };
                 }
             },
         );
         if !is_last {
-            for ((u, v), a) in flow.u.values_mut().iter_mut().zip(flow.v.values_mut()).zip(&answers) {
+            for ((u, v), a) in flow.u.values_mut().iter_mut().zip(flow.v.values_mut()).zip(answers.values()) {
                 (*u, *v) = (a.u, a.v);
             }
         }
     }
-    let plane = |f: fn(&Answer) -> f32| {
-        Grid::from_values(width, height, answers.iter().map(f).collect())
-            .unwrap_or_else(|| Grid::filled(width, height, f32::NAN))
-    };
-    FlowField {
-        u: Field::from_grid(plane(|a| a.u)),
-        v: Field::from_grid(plane(|a| a.v)),
-        cov_uu: plane(|a| a.cov[0]),
-        cov_uv: plane(|a| a.cov[1]),
-        cov_vv: plane(|a| a.cov[2]),
-    }
+    answers
 }
 
 /// Write what is to be summed of row `y`; zeros where the displacement leaves the second image.
@@ -127,19 +102,18 @@ struct Window {
 }
 
 impl Window {
-    fn new([count, gu, gv, r, guu, guv, gvv, gur, gvr, rr]: [f32; SUMS], options: &FlowOptions) -> Self {
+    fn new([count, gu, gv, r, guu, guv, gvv, gur, gvr, rr]: [f32; SUMS], area: f32, noise: f32) -> Self {
         let n = 1.0 / count.max(1e-6);
         let (gu, gv, r) = (gu * n, gv * n, r * n);
         let g = [guu * n - gu * gu, guv * n - gu * gv, gvv * n - gv * gv];
         let b = [gur * n - gu * r, gvr * n - gv * r];
         // A little of the noise on the diagonal keeps the step finite without texture.
-        let floor = 0.05 * options.noise_floor * options.noise_floor;
+        let floor = 0.05 * noise * noise;
         let (uu, vv) = (g[0] + floor, g[2] + floor);
         let det = uu * vv - g[1] * g[1];
         let step = [-(vv * b[0] - g[1] * b[1]) / det, -(uu * b[1] - g[1] * b[0]) / det];
         let residual = (rr * n - r * r + step[0] * b[0] + step[1] * b[1]).max(0.0);
-        let pixels = count * options.correlation_area_px();
-        Self { coverage: count, pixels, g, step, residual }
+        Self { coverage: count, pixels: count * area, g, step, residual }
     }
 
     /// The displacement after this step.
@@ -153,7 +127,7 @@ impl Window {
     }
 
     /// The displacement after this last step with its covariance, or nothing if it cannot be trusted.
-    fn answer(&self, (u, v): (f32, f32), options: &FlowOptions) -> Answer {
+    fn answer(&self, (u, v): (f32, f32), factor: f32, options: &FlowOptions) -> Answer {
         // Three unknowns (two components and the offset) have been fitted.
         let pixels = self.pixels.max(4.0);
         let floor = options.noise_floor * options.noise_floor;
@@ -163,7 +137,7 @@ impl Window {
         let (uu, uv, vv) = (self.g[0] - noise, self.g[1], self.g[2] - noise);
         let det = uu * vv - uv * uv;
         // G⁻¹ (G + noise) G⁻¹: the noise of the gradients multiplies that of the difference.
-        let scale = variance * hidden_noise((u, v)) / (pixels * det);
+        let scale = variance * factor / (pixels * det);
         let [iuu, iuv, ivv] = [vv / det, -uv / det, uu / det];
         let extra = options.sigma_floor_px * options.sigma_floor_px;
         let cov = [
@@ -171,16 +145,19 @@ impl Window {
             scale * (-uv + noise * iuv * (iuu + ivv) * det),
             scale * (uu + noise * (ivv * ivv + iuv * iuv) * det) + extra,
         ];
-        let least = 0.5 * (uu + vv) - (0.5 * (uu - vv)).hypot(uv);
+        let least = 0.5 * (uu + vv - ((uu - vv) * (uu - vv) + 4.0 * uv * uv).sqrt());
         let (half, difference) = (0.5 * (cov[0] + cov[2]), 0.5 * (cov[0] - cov[2]));
-        let largest = half + difference.hypot(cov[1]);
-        let trusted = self.coverage >= MIN_COVERAGE
-            && least > MIN_TEXTURE * noise
-            && largest <= options.max_sigma_px * options.max_sigma_px
+        let largest = half + (difference * difference + cov[1] * cov[1]).sqrt();
+        let is_textured =
+            least > options.min_texture * noise && largest <= options.max_sigma_px * options.max_sigma_px;
+        if !is_textured {
+            return Answer::UNKNOWN;
+        }
+        let matches = self.coverage >= MIN_COVERAGE
             && self.residual <= options.max_residual * options.max_residual
             && self.step[0].abs().max(self.step[1].abs()) <= MAX_LAST_STEP_PX;
-        if !trusted {
-            return MISSING;
+        if !matches {
+            return Answer::REFUTED;
         }
         Answer { u: u + self.step[0], v: v + self.step[1], cov }
     }

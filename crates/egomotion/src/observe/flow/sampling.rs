@@ -3,6 +3,7 @@
 use crate::geometry::Grid;
 
 /// Bilinear value at (x, y), which is clamped to the plane; the plane is not empty.
+#[inline]
 pub(super) fn interpolate(plane: &Grid<f32>, x: f32, y: f32) -> f32 {
     let (width, height) = plane.size();
     let (x, y) = (x.clamp(0.0, (width - 1) as f32), y.clamp(0.0, (height - 1) as f32));
@@ -15,7 +16,7 @@ pub(super) fn interpolate(plane: &Grid<f32>, x: f32, y: f32) -> f32 {
 }
 
 /// Catmull–Rom weights of the four pixels around a fraction t of 0 … 1.
-pub(super) fn cubic_weights(t: f32) -> [f32; 4] {
+fn cubic_weights(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [
         0.5 * (-t3 + 2.0 * t2 - t),
@@ -26,6 +27,7 @@ pub(super) fn cubic_weights(t: f32) -> [f32; 4] {
 }
 
 /// Cubic (Catmull–Rom) value at (x, y), bilinear within a pixel of the border; `None` outside.
+#[inline]
 pub(super) fn cubic(plane: &Grid<f32>, x: f32, y: f32) -> Option<f32> {
     let (width, height) = plane.size();
     if !(x >= 0.0 && y >= 0.0 && x <= width as f32 - 1.0 && y <= height as f32 - 1.0) {

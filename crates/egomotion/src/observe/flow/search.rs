@@ -159,9 +159,9 @@ impl Template {
     fn evaluate(&self, pair: &Pair<'_>, u: f32, v: f32) -> (f32, [f32; 2]) {
         let moved = pair.patch(self.x + u, self.y + v);
         let [mut sum, mut squares, mut du, mut dv] = [[0.0_f32; PATCH]; 4];
-        for k in 0..PATCH {
+        for (k, moved) in moved.iter().enumerate() {
             for i in 0..PATCH {
-                let r = moved[k][i] - self.grey[k][i];
+                let r = moved[i] - self.grey[k][i];
                 sum[i] += r;
                 squares[i] += r * r;
                 du[i] += r * self.du[k][i];
@@ -182,19 +182,19 @@ impl Template {
         let mut best = Match { u, v, cost };
         for _ in 0..iterations {
             let (next_u, next_v) = (best.u + step[0], best.v + step[1]);
-            if !((next_u - u).abs().max((next_v - v).abs()) < MAX_STRAY) {
+            let is_near = (next_u - u).abs().max((next_v - v).abs()) < MAX_STRAY;
+            if !is_near {
                 return Match { u, v, cost };
             }
             let (next_cost, next_step) = self.evaluate(pair, next_u, next_v);
-            if !(next_cost < best.cost) {
+            let is_better = next_cost < best.cost;
+            if is_better {
+                best = Match { u: next_u, v: next_v, cost: next_cost };
+            }
+            if !is_better || step[0].abs().max(step[1].abs()) < SMALL_STEP {
                 break;
             }
-            best = Match { u: next_u, v: next_v, cost: next_cost };
-            let length = step[0].abs().max(step[1].abs());
             step = next_step;
-            if length < SMALL_STEP {
-                break;
-            }
         }
         best
     }

@@ -47,13 +47,16 @@ fn filter(
             count.fill(0.0);
             let (own_u, own_v) = (flow.u.row(y), flow.v.row(y));
             neighbours(y, &mut |other_u, other_v| {
-                for x in 0..width {
-                    let du = (other_u[x] - own_u[x]).abs();
-                    let dv = (other_v[x] - own_v[x]).abs();
-                    let weight = if du.max(dv) < SAME_MOTION_PX { 1.0 } else { 0.0 };
-                    count[x] += weight;
-                    u[x] += weight * other_u[x];
-                    v[x] += weight * other_v[x];
+                let rows = other_u.iter().zip(other_v).zip(own_u.iter().zip(own_v));
+                let sums = count.iter_mut().zip(u.iter_mut().zip(v.iter_mut()));
+                for (((other_u, other_v), (own_u, own_v)), (count, (u, v))) in rows.zip(sums) {
+                    let du = (other_u - own_u).abs();
+                    let dv = (other_v - own_v).abs();
+                    let alike = (du < SAME_MOTION_PX) & (dv < SAME_MOTION_PX);
+                    let weight = if alike { 1.0 } else { 0.0 };
+                    *count += weight;
+                    *u += weight * other_u;
+                    *v += weight * other_v;
                 }
             });
             for x in 0..width {

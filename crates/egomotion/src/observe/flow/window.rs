@@ -36,28 +36,36 @@ pub(super) fn window_sums<const N: usize, T: Send>(
                 produce(next, &mut ring[next % weights.len()]);
                 next += 1;
             }
-            columns.iter_mut().for_each(|c| c[radius..radius + width].fill(0.0));
-            for row in y.saturating_sub(radius)..=last {
-                let weight = weights[row + radius - y];
-                for (column, values) in columns.iter_mut().zip(&ring[row % weights.len()]) {
-                    add_scaled(&mut column[radius..radius + width], values, weight);
-                }
-            }
-            for (sum, column) in sums.iter_mut().zip(&columns) {
-                sum.fill(0.0);
-                for (k, &weight) in weights.iter().enumerate() {
-                    add_scaled(sum, &column[k..k + width], weight);
-                }
+            let above = y.saturating_sub(radius);
+            let heights = &weights[above + radius - y..=last + radius - y];
+            for n in 0..N {
+                let row = |k: usize| &ring[(above + k) % weights.len()][n][..];
+                weighted_sum(&mut columns[n][radius..radius + width], heights, row);
+                weighted_sum(&mut sums[n], weights, |k| &columns[n][k..k + width]);
             }
             consume(y, &sums, out);
         }
     });
 }
 
-/// sum += weight × values.
-fn add_scaled(sum: &mut [f32], values: &[f32], weight: f32) {
-    for (s, v) in sum.iter_mut().zip(values) {
-        *s += weight * v;
+/// Σ weights[k] × terms(k), each as long as `sum`; sixteen sums at a time stay in registers.
+fn weighted_sum<'a>(sum: &mut [f32], weights: &[f32], terms: impl Fn(usize) -> &'a [f32]) {
+    const LANES: usize = 16;
+    let (blocks, rest) = sum.as_chunks_mut::<LANES>();
+    let done = blocks.len() * LANES;
+    for (b, block) in blocks.iter_mut().enumerate() {
+        let mut lanes = [0.0_f32; LANES];
+        for (k, weight) in weights.iter().enumerate() {
+            if let Some(term) = terms(k)[b * LANES..].first_chunk::<LANES>() {
+                for i in 0..LANES {
+                    lanes[i] += weight * term[i];
+                }
+            }
+        }
+        *block = lanes;
+    }
+    for (i, sum) in rest.iter_mut().enumerate() {
+        *sum = weights.iter().enumerate().map(|(k, weight)| weight * terms(k)[done + i]).sum();
     }
 }
 
