@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::corners::{Corner, corners};
 use super::observation::StereoTrack;
 use super::patch::{Freedom, Located, Patch};
-use super::pyramid::{Gradients, Pyramid, gradients};
+use super::pyramid::{Gradients, Pyramid, gradients, smooth};
 use crate::geometry::{Field, Gaussian, Grid, Image, StereoRig, Twist};
 
 /// How corners are found and followed.
@@ -63,6 +63,7 @@ pub struct StereoPyramid {
 impl StereoPyramid {
     /// Pyramids of a rectified pair.
     pub fn new(left: Image, right: Image, levels: usize) -> Self {
+        let (left, right) = rayon::join(|| smooth(&left), || smooth(&right));
         let gradients = gradients(&left);
         let (left, right) = rayon::join(|| Pyramid::new(left, levels), || Pyramid::new(right, levels));
         Self { left, right, gradients }

@@ -18,7 +18,7 @@ pub enum Observed<'a> {
     /// Tracked corners.
     Sparse(&'a [StereoTrack]),
     /// Dense fields, of which every `sample_step_px`-th pixel is used.
-    Dense(DensePair<'a>),
+    Dense(DensePair<'a>, &'a [StereoTrack]),
 }
 
 /// φ by the configured method; rows and robust weights start from `start`.
@@ -54,14 +54,18 @@ impl Solver<'_> {
     fn tracks(&self, observed: &Observed<'_>) -> Vec<StereoTrack> {
         match observed {
             Observed::Sparse(tracks) => tracks.to_vec(),
-            Observed::Dense(pair) => pair.every(self.config.sample_step_px, DensePair::stereo_track),
+            Observed::Dense(pair, tracks) => {
+                let mut all = tracks.to_vec();
+                all.extend(pair.every(self.config.sample_step_px, DensePair::stereo_track));
+                all
+            }
         }
     }
 
     fn flows(&self, observed: &Observed<'_>) -> Vec<StereoFlow> {
         let discrete = self.config.approach == Approach::Discrete;
         match observed {
-            Observed::Dense(pair) if !discrete => {
+            Observed::Dense(pair, _) if !discrete => {
                 pair.every(self.config.sample_step_px, DensePair::stereo_flow)
             }
             _ if discrete => self.tracks(observed).iter().map(StereoTrack::discrete_flow).collect(),
@@ -74,10 +78,10 @@ impl Solver<'_> {
         let step = self.config.sample_step_px;
         match (observed, self.config.approach) {
             (Observed::Sparse(_), _) => Vec::new(),
-            (Observed::Dense(pair), Approach::Discrete) => {
+            (Observed::Dense(pair, _), Approach::Discrete) => {
                 pair.every(step, |pair, u, v| Some(pair.depth_track(u, v)?.depth_change(bf)))
             }
-            (Observed::Dense(pair), Approach::Differential) => {
+            (Observed::Dense(pair, _), Approach::Differential) => {
                 pair.every(step, |pair, u, v| Some(pair.depth_flow(u, v)?.depth_change(bf)))
             }
         }

@@ -427,9 +427,9 @@ impl FramePair<'_> {
         };
         let pair = DensePair { rig: self.rig, before, after, flow: &flow, flow_right: right.as_ref() };
         let start = rough.unwrap_or_else(|_| Twist::zero());
-        let _ = tracks;
-        let motion =
-            timed(&mut stages.estimate_ms, || solve(&Observed::Dense(pair), self.rig, &start, self.config));
+        let motion = timed(&mut stages.estimate_ms, || {
+            solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config)
+        });
         let (maps, candidates) =
             timed(&mut stages.maps_ms, || motion_maps(&pair, motion.as_ref().ok(), self.config, self.dt_s()));
         PairResult {
