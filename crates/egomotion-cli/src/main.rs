@@ -1,2 +1,6 @@
 //! The command `egomotion`.
+
+#[allow(dead_code)]
+mod report;
+
 fn main() {}
