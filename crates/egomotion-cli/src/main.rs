@@ -1,6 +1,6 @@
 //! The command `egomotion`.
 
-#[allow(dead_code)]
+#[allow(dead_code, unused_imports)]
 mod report;
 
 fn main() {}

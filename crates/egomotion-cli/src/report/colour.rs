@@ -28,18 +28,21 @@ pub const EMBER: ColourMap = ColourMap(&[
 
 /// Orange – white – blue, from ColorBrewer's Oranges and Blues: negative, zero, positive.
 pub const DIVERGING: ColourMap = ColourMap(&[
-    0x7f2704, 0xb84203, 0xe5660f, 0xfd9a50, 0xfdd0a2, 0xf7f7f7, 0xc6dbef, 0x7fb8dc, 0x3787c0, 0x125ba0, 0x08306b,
+    0x7f2704, 0xb84203, 0xe5660f, 0xfd9a50, 0xfdd0a2, 0xf7f7f7, 0xc6dbef, 0x7fb8dc, 0x3787c0, 0x125ba0,
+    0x08306b,
 ]);
 
 impl ColourMap {
-    /// The colour at `share`, 0 … 1; outside it is that of the end.
+    /// The colour at `share`, 0 … 1; outside it is that of the end, of NaN that of the start.
     pub fn at(&self, share: f64) -> Rgb {
         let Some(last) = self.0.len().checked_sub(1) else { return [0; 3] };
-        let place = share.clamp(0.0, 1.0) * last as f64;
+        let place = if share > 0.0 { share.min(1.0) * last as f64 } else { 0.0 };
         let index = (place as usize).min(last);
         let rest = place - index as f64;
         let [a, b] = [index, (index + 1).min(last)].map(|i| self.0[i].to_be_bytes());
-        std::array::from_fn(|k| (f64::from(a[k + 1]) * (1.0 - rest) + f64::from(b[k + 1]) * rest).round() as u8)
+        std::array::from_fn(|k| {
+            (f64::from(a[k + 1]) * (1.0 - rest) + f64::from(b[k + 1]) * rest).round() as u8
+        })
     }
 
     /// The map as a CSS gradient from left to right.
@@ -91,5 +94,38 @@ impl Spread {
             Self::Linear | Self::Logarithmic if high - low < 1e-9 => (low, low + 1e-9 + 0.01 * low.abs()),
             Self::Linear | Self::Logarithmic => (low, high),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colours_meet_their_stops_and_ends() {
+        assert_eq!(VIRIDIS.at(0.0), [0x44, 0x01, 0x54]);
+        assert_eq!(VIRIDIS.at(7.0), [0xfd, 0xe7, 0x25]);
+        assert_eq!(DIVERGING.at(0.5), [0xf7; 3]);
+        assert_eq!(CIVIDIS.at(f64::NAN), CIVIDIS.at(0.0));
+        assert_eq!(CIVIDIS.at(1.0 / 9.0), [0x12, 0x35, 0x70]);
+    }
+
+    #[test]
+    fn sequential_maps_grow_steadily_in_lightness() {
+        let light = |[r, g, b]: Rgb| 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
+        for (map, sign) in [(VIRIDIS, 1.0), (CIVIDIS, 1.0), (EMBER, -1.0)] {
+            let levels: Vec<f64> = (0..=50).map(|k| sign * light(map.at(f64::from(k) / 50.0))).collect();
+            assert!(levels.windows(2).all(|w| w[1] > w[0]), "{levels:?}");
+        }
+    }
+
+    #[test]
+    fn one_range_for_all_pictures() {
+        let ranges = [(1.0, 4.0), (2.0, 5.0), (-900.0, 1e9)];
+        assert_eq!(Spread::Linear.common(ranges.into_iter()), (1.0, 5.0));
+        assert_eq!(Spread::Symmetric.common(ranges.into_iter()), (-5.0, 5.0));
+        assert_eq!(Spread::Linear.common(std::iter::empty()), (0.0, 1.0));
+        let (low, high) = Spread::Linear.common([(3.0, 3.0)].into_iter());
+        assert!(low <= 3.0 && 3.0 < high);
     }
 }

@@ -48,10 +48,10 @@ fn frames(report: &Report<'_>) -> Figure {
 fn travelled(report: &Report<'_>) -> Option<Figure> {
     let total = *travelled_m(report.poses).last()?;
     let unit = length(total);
-    let value = format!("{} {}", significant(total * unit.factor, 3), unit.name);
+    let value = unit.show(total * unit.factor, 3);
     let (first, last) = report.poses.first().zip(report.poses.last())?;
     let away = (last.translation - first.translation).norm();
-    let beside = format!("ends {} {} from its start", significant(away * unit.factor, 3), unit.name);
+    let beside = format!("ends {} from its start", unit.show(away * unit.factor, 3));
     Some(Figure { name: "Distance travelled", value, beside })
 }
 
@@ -93,8 +93,12 @@ fn translation_error(report: &Report<'_>) -> Option<Figure> {
     let show = |v: f64| significant(v * unit.factor, 2);
     Some(Figure {
         name: "Translation error",
-        value: format!("{} {}", show(error.t_rmse_m), unit.name),
-        beside: format!("frame to frame, root mean square; median {}, largest {}", show(error.t_median_m), show(error.t_max_m)),
+        value: unit.show(error.t_rmse_m * unit.factor, 2),
+        beside: format!(
+            "frame to frame, root mean square; median {}, largest {}",
+            show(error.t_median_m),
+            show(error.t_max_m)
+        ),
     })
 }
 
@@ -104,7 +108,11 @@ fn rotation_error(report: &Report<'_>) -> Option<Figure> {
     Some(Figure {
         name: "Rotation error",
         value: format!("{}°", show(error.r_rmse_deg)),
-        beside: format!("frame to frame, root mean square; median {}°, largest {}°", show(error.r_median_deg), show(error.r_max_deg)),
+        beside: format!(
+            "frame to frame, root mean square; median {}°, largest {}°",
+            show(error.r_median_deg),
+            show(error.r_max_deg)
+        ),
     })
 }
 
@@ -122,6 +130,6 @@ fn within_two_sigma(report: &Report<'_>) -> Option<Figure> {
     (all > 0).then(|| Figure {
         name: "Truth within ±2σ",
         value: format!("{} %", significant(100.0 * f64::from(within as u32) / f64::from(all), 3)),
-        beside: format!("{within} of {}; 95 % if σ is honest", count(all as usize, "component", "components")),
+        beside: format!("{within} of {}; 95 % is expected", count(all as usize, "component", "components")),
     })
 }

@@ -7,7 +7,7 @@ use super::charts::{clip_path, cursor, time_axes, unanswered, vertical, view_box
 use super::plot::{Axes, Scale, extent, path};
 
 /// Width and height of the chart, in SVG units.
-const SIZE: (f64, f64) = (440.0, 300.0);
+const SIZE: (f64, f64) = (440.0, 420.0);
 
 /// One frame's answer: when, how long, and from when to when.
 struct Answer {
@@ -21,18 +21,24 @@ struct Answer {
 /// The chart; `None` if nothing ever approaches.
 pub fn chart(report: &Report<'_>) -> Option<Markup> {
     let (times, x_name) = report.abscissa();
-    let answers: Vec<Option<Answer>> = report.frames.iter().zip(&times).map(|(row, &t)| answer(row, t)).collect();
+    let answers: Vec<Option<Answer>> =
+        report.frames.iter().zip(&times).map(|(row, &t)| answer(row, t)).collect();
     let y = Scale::log(range(&answers)?, vertical(SIZE));
     let axes = time_axes(&times, SIZE, y);
     let intervals = |open: bool| -> String {
-        answers.iter().flatten().filter(|a| a.high.is_infinite() == open).filter_map(|a| bar(a, &axes)).collect()
+        answers
+            .iter()
+            .flatten()
+            .filter(|a| a.high.is_infinite() == open)
+            .filter_map(|a| bar(a, &axes))
+            .collect()
     };
     let bar_px = (0.6 * axes.inside()[2] / times.len().max(1) as f64).clamp(1.0, 9.0);
     let points = answers.iter().map(|a| a.as_ref().and_then(|a| axes.at(a.time, a.seconds)));
     let dots = answers.len() <= 80;
     Some(html! {
         svg viewBox=(view_box(SIZE)) role="img" aria-label="time to impact of the nearest obstacle" {
-            (axes.grid(x_name, "", (7, 7)))
+            (axes.grid(x_name, "", (7, 8)))
             (clip_path("clip-impact", &axes))
             g clip-path="url(#clip-impact)" {
                 path class="interval" stroke-width=(format!("{bar_px:.1}")) d=(intervals(false)) {}

@@ -9,6 +9,15 @@ pub struct Unit {
     pub name: &'static str,
 }
 
+impl Unit {
+    /// A value that is in this unit already, with the unit's sign.
+    pub fn show(&self, value: f64, digits: i32) -> String {
+        // The degree sign follows its number without a space.
+        let space = if self.name == DEGREES.name { "" } else { "\u{a0}" };
+        format!("{}{space}{}", significant(value, digits), self.name)
+    }
+}
+
 /// Degrees, from radians.
 pub const DEGREES: Unit = Unit { factor: 180.0 / std::f64::consts::PI, name: "°" };
 
@@ -59,4 +68,22 @@ pub fn with_sigma(value: f64, sigma: f64) -> String {
 /// A number of things with its noun.
 pub fn count(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!(significant(0.012345, 2), "0.012");
+        assert_eq!(significant(-1234.5, 3), "−1234");
+        assert_eq!(significant(f64::NAN, 3), "–");
+        assert_eq!(significant(3.2e-9, 2), "3.2e−9");
+        assert_eq!(fixed(-0.0004, 2), "0.00");
+        assert_eq!(with_sigma(-47.1234, 0.0213), "−47.123 ± 0.021");
+        assert_eq!(with_sigma(1.5, f64::INFINITY), "1.500");
+        assert_eq!(DEGREES.show(1.5, 2), "1.5°");
+        assert_eq!(length(0.02).show(20.0, 2), "20\u{a0}mm");
+    }
 }

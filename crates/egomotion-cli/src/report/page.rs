@@ -58,7 +58,10 @@ fn notes(report: &Report<'_>) -> Vec<String> {
     let mut notes = report.notes.clone();
     let shown = report.shown().len();
     if shown < report.pictures.len() {
-        notes.push(format!("Pictures are shown of {shown} frames, evenly spaced, out of {}.", report.pictures.len()));
+        notes.push(format!(
+            "Pictures are shown of {shown} frames, evenly spaced, out of {}.",
+            report.pictures.len()
+        ));
     }
     notes
 }
@@ -92,6 +95,10 @@ fn impacts(report: &Report<'_>) -> Markup {
 
 fn motion(report: &Report<'_>) -> Markup {
     let truth = report.frames.iter().any(|row| row.truth.is_some());
+    let gaps = report.frames.iter().any(|row| row.asks() && row.motion.is_none());
+    let mut items = vec![("line", "estimate"), ("band", "±2σ")];
+    items.extend(truth.then_some(("true", "truth")));
+    items.extend(gaps.then_some(("missing", "no answer")));
     html! {
         section {
             h2 { "Motion from frame to frame: φ" }
@@ -99,8 +106,10 @@ fn motion(report: &Report<'_>) -> Markup {
                 "φ is how the scene moves as the camera sees it, from one frame to the next: three shifts "
                 b { "t" } " (X right, Y down, Z ahead) and three turns " b { "Ω" }
                 " about these axes. The camera itself moves the opposite way. The true value lies in the band, ±2σ, 95 times out of 100."
+                @if truth { " The strip below each chart shows how far off the estimate is, against the same band." }
+                @if gaps { " After a frame without an answer the interval is longer, and so is φ." }
             }
-            (legend(&[("line", "estimate"), ("band", "±2σ"), ("missing", "no answer"), ("true", "truth")][..if truth { 4 } else { 3 }]))
+            (legend(&items))
             (charts::phi(report))
         }
     }
@@ -156,7 +165,7 @@ fn legend(items: &[(&str, &str)]) -> Markup {
                             "band" => path class="band" d="M0 1h26v10H0z" {},
                             "interval" => path class="interval" stroke-width="7" d="M7 0v12M19 0v12" {},
                             "missing" => path class="missing" d="M8 2v8M18 2v8" {},
-                            "true" => path class="true wide" d="M0 6h26" {},
+                            "true" => path class="true" d="M0 6h26" {},
                             _ => path class="line" d="M0 6h26" {},
                         }
                     }
@@ -210,7 +219,7 @@ fn panel(shown: &[&FramePictures], i: usize, quantity: &Quantity, size: (usize, 
         Spread::Logarithmic => Scale::log(ends.into(), (0.0, 100.0)),
         Spread::Linear | Spread::Symmetric => Scale::linear(ends.into(), (0.0, 100.0)),
     };
-    let ticks = scale.ticks(4).into_iter().filter_map(|(v, label)| Some((scale.at(v)?, label)));
+    let ticks = apart(scale.ticks(5).into_iter().filter_map(|(v, label)| Some((scale.at(v)?, label))));
     html! {
         figure {
             figcaption { b { (quantity.name) } " " span class="unit" { (unit.name) @if quantity.metres { " per interval" } } }
@@ -221,6 +230,17 @@ fn panel(shown: &[&FramePictures], i: usize, quantity: &Quantity, size: (usize, 
             }
         }
     }
+}
+
+/// Ticks that leave room for their labels, places in percent.
+fn apart(ticks: impl Iterator<Item = (f64, String)>) -> Vec<(f64, String)> {
+    let mut kept: Vec<(f64, String)> = Vec::new();
+    for tick in ticks {
+        if kept.last().is_none_or(|last| tick.0 - last.0 > 20.0) {
+            kept.push(tick);
+        }
+    }
+    kept
 }
 
 /// The pictures of one panel on top of each other, of which the script shows one.

@@ -14,14 +14,14 @@ const MOST_WIDTH_PX: usize = 480;
 pub const MOST_PICTURES: usize = 40;
 
 /// Palette entries that hold values; entry 0 is a missing pixel. Few, so that the page stays small.
-const LEVELS: u8 = 96;
+const LEVELS: u8 = 64;
 
 /// The quantities that are shown as maps, in the order of [`FramePictures`].
 pub const QUANTITIES: [Quantity; 4] = [
+    Quantity { name: "Time to impact", map: EMBER, spread: Spread::Logarithmic, metres: false, unit: "s" },
     Quantity { name: "Disparity", map: VIRIDIS, spread: Spread::Linear, metres: false, unit: "px" },
     Quantity { name: "Depth velocity VZ", map: DIVERGING, spread: Spread::Symmetric, metres: true, unit: "" },
     Quantity { name: "σ of VZ", map: CIVIDIS, spread: Spread::Logarithmic, metres: true, unit: "" },
-    Quantity { name: "Time to impact", map: EMBER, spread: Spread::Logarithmic, metres: false, unit: "s" },
 ];
 
 /// How one quantity is shown.
@@ -59,10 +59,10 @@ impl FramePictures {
     /// The left image and the maps of a frame pair, reduced to 480 pixels in width.
     pub fn new(frame: usize, left: &Image, dense: &DenseResults) -> Self {
         let planes = [
+            dense.motion.impact.grid(),
             dense.disparity.shift.grid(),
             dense.motion.depth_velocity.grid(),
             dense.motion.depth_velocity_sigma.grid(),
-            dense.motion.impact.grid(),
         ];
         let maps = std::array::from_fn(|i| MapPicture::new(planes[i], QUANTITIES[i].spread));
         Self { frame, left: grey(left), maps }

@@ -45,19 +45,26 @@ impl Scale {
 
     /// About `n` round values with their labels.
     pub fn ticks(&self, n: usize) -> Vec<(f64, String)> {
+        if n == 0 {
+            return Vec::new();
+        }
         if self.log { self.log_ticks(n) } else { self.linear_ticks(n) }
     }
 
     fn linear_ticks(&self, n: usize) -> Vec<(f64, String)> {
         let (lo, hi) = self.from;
-        let rough = (hi - lo) / n.max(1) as f64;
+        let rough = (hi - lo) / n as f64;
         let decade = 10f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0].map(|s| s * decade).into_iter().find(|s| *s >= rough * 0.999);
-        let step = step.unwrap_or(rough);
-        let decimals = (-step.log10().floor()).max(0.0) as usize;
+        let round =
+            [1.0, 2.0, 2.5, 5.0, 10.0].into_iter().find(|s| s * decade >= rough * 0.85).unwrap_or(10.0);
+        let step = round * decade;
+        let decimals = (-step.log10().floor()).max(0.0) as usize + usize::from(round == 2.5 && decade < 5.0);
         let first = (lo / step).ceil() as i64;
         let last = (hi / step).floor() as i64;
-        (first..=last.min(first.saturating_add(50))).map(|k| k as f64 * step).map(|v| (v, fixed(v, decimals))).collect()
+        (first..=last.min(first.saturating_add(50)))
+            .map(|k| k as f64 * step)
+            .map(|v| (v, fixed(v, decimals)))
+            .collect()
     }
 
     fn log_ticks(&self, n: usize) -> Vec<(f64, String)> {
@@ -72,9 +79,13 @@ impl Scale {
             });
             valued.filter(|(v, _)| (lo * 0.999..=hi * 1.001).contains(v)).collect()
         };
-        let choices: [&[f64]; 3] = [&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0], &[1.0, 2.0, 5.0], &[1.0]];
+        let choices: [&[f64]; 4] =
+            [&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0], &[1.0, 2.0, 3.0, 5.0], &[1.0, 2.0, 5.0], &[1.0]];
         let mut ticks = choices.map(of).into_iter().skip_while(|t| t.len() > n + 1);
-        ticks.next().unwrap_or_else(|| of(choices[2]))
+        // Of many decades only some get a label.
+        let some =
+            || of(choices[3]).into_iter().step_by((hi / lo).log10().max(1.0) as usize / n + 1).collect();
+        ticks.next().unwrap_or_else(some)
     }
 }
 
@@ -88,7 +99,7 @@ pub struct Axes {
 }
 
 /// Space for labels around a chart: left, right, top, bottom.
-pub const MARGIN: [f64; 4] = [44.0, 8.0, 8.0, 34.0];
+pub const MARGIN: [f64; 4] = [50.0, 8.0, 8.0, 34.0];
 
 impl Axes {
     /// Where the point (x, y) lies.
@@ -181,4 +192,46 @@ pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
         None => Some((v, v)),
         Some((lo, hi)) => Some((v.min(lo), v.max(hi))),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        let labels = |scale: Scale, n| scale.ticks(n).into_iter().map(|(_, l)| l).collect::<Vec<_>>();
+        assert_eq!(
+            labels(Scale::linear((-0.2, 1.1), (0.0, 1.0)), 5),
+            ["0.00", "0.25", "0.50", "0.75", "1.00"]
+        );
+        assert_eq!(labels(Scale::linear((-3.0, 3.0), (0.0, 1.0)), 3), ["−2", "0", "2"]);
+        assert_eq!(labels(Scale::log((0.4, 30.0), (0.0, 1.0)), 6), ["0.5", "1", "2", "5", "10", "20"]);
+        for range in
+            [(f64::NAN, 1.0), (2.0, 2.0), (5.0, -5.0), (-1e308, 1e308), (0.0, f64::INFINITY), (1e300, 1e300)]
+        {
+            for scale in [Scale::linear(range, (0.0, 100.0)), Scale::log(range, (0.0, 100.0))] {
+                assert!(scale.ticks(5).len() < 60);
+                for value in [0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308] {
+                    assert!(scale.at(value).is_none_or(|at| at.abs() <= 400.0), "{range:?} {value}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_path_starts_anew_after_a_gap() {
+        let points =
+            [Some((0.0, 0.0)), Some((1.0, 1.0)), None, Some((3.0, f64::NAN)), Some((4.0, 4.0)), None];
+        assert_eq!(path(points), "M0.0 0.0L1.0 1.0M4.0 4.0h2");
+        assert_eq!(path([]), "");
+    }
+
+    #[test]
+    fn a_band_closes_each_piece() {
+        let d = band(&[Some((0.0, 1.0, 2.0)), Some((1.0, 1.0, 3.0)), None, Some((5.0, 0.0, 1.0))]);
+        assert_eq!(d.matches('M').count(), 2);
+        assert_eq!(d.matches('Z').count(), 2);
+        assert!(d.starts_with("M0.0 1.0L0.0 1.0L1.0 1.0L1.0 3.0L1.0 3.0L0.0 2.0Z"), "{d}");
+    }
 }

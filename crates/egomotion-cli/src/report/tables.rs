@@ -6,7 +6,7 @@ use super::number::{DEGREES, fixed, length, significant, with_sigma};
 use super::{FrameRow, Report};
 
 /// Most rows of the table; all are in `motion.csv`.
-const MOST_ROWS: usize = 2000;
+const MOST_ROWS: usize = 1000;
 
 /// One bar for each stage, and what is left of the whole.
 pub fn stages(report: &Report<'_>) -> Markup {
@@ -23,7 +23,7 @@ pub fn stages(report: &Report<'_>) -> Markup {
             @for (name, ms) in &stages {
                 tr {
                     th scope="row" { (name) }
-                    td { div class="bar" style=(format!("width:{:.2}%", 100.0 * ms / longest)) {} }
+                    td { div class="bar" style=(format!("width:{:.2}%", 100.0 * (ms / longest))) {} }
                     td class="ms" { (fixed(*ms, if *ms < 9.95 { 1 } else { 0 })) " ms" }
                 }
             }
@@ -47,7 +47,7 @@ pub fn frames(report: &Report<'_>) -> Markup {
                 } }
                 tbody {
                     @for row in shown {
-                        tr class=(if row.motion.is_some() { "" } else { "none" }) {
+                        tr class=(if row.asks() && row.motion.is_none() { "none" } else { "" }) {
                             td { (row.frame) }
                             td { (fixed(row.time_s, 3)) }
                             td { (row.dt_s.map_or("–".into(), |dt| significant(dt, 4))) }

@@ -5,13 +5,13 @@ use maud::{Markup, html};
 use nalgebra::{Matrix2, Matrix6, Vector3};
 
 use super::Report;
-use super::number::{length, significant};
+use super::number::length;
 use super::plot::{Axes, MARGIN, Scale, extent, path};
 
 /// Width of the chart, in SVG units.
 const WIDTH: f64 = 440.0;
 /// Least and greatest height.
-const HEIGHTS: (f64, f64) = (260.0, 460.0);
+const HEIGHTS: (f64, f64) = (300.0, 440.0);
 /// About so many ellipses along the path.
 const ELLIPSES: usize = 10;
 /// 95 % quantile of χ² with two degrees of freedom.
@@ -25,14 +25,16 @@ pub fn chart(report: &Report<'_>) -> Markup {
     let place = |pose: &RigidMotion| axes.at(pose.translation.x, pose.translation.z);
     let covariances = position_covariances(report);
     let ellipses: Vec<Ellipse> = spaced(report.poses.len(), ELLIPSES)
-        .filter_map(|k| Ellipse::new(place(report.poses.get(k)?)?, &(*covariances.get(k)?)?, pixels_per_metre(&axes)))
+        .filter_map(|k| {
+            Ellipse::new(place(report.poses.get(k)?)?, &(*covariances.get(k)?)?, pixels_per_metre(&axes))
+        })
         .filter(|ellipse| ellipse.radii.0 > 1.2)
         .collect();
     let ends = [report.poses.first().zip(Some("start")), report.poses.last().zip(Some("end"))];
     html! {
         svg viewBox=(format!("0 0 {WIDTH} {height:.1}")) role="img" aria-label="path of the camera from above" {
             (axes.grid("X, to the right (m)", "Z, forward (m)", (6, 6)))
-            path class="true wide" d=(path(truth.iter().map(place))) {}
+            path class="true" d=(path(truth.iter().map(place))) {}
             @for ellipse in &ellipses { (ellipse.markup()) }
             path class="line" d=(path(report.poses.iter().map(place))) {}
             @for (pose, name) in ends.into_iter().flatten() {
@@ -186,14 +188,93 @@ fn half_axes(cov: &Matrix2<f64>) -> Option<[(f64, (f64, f64)); 2]> {
 
 fn sentence(covariances: &[Option<Matrix2<f64>>], visible: bool) -> String {
     let Some(Some(last)) = covariances.last() else {
-        return "How sure the last position is cannot be said: some motion on the way is not fully known.".into();
+        return "How sure the last position is cannot be said: some motion on the way is not fully known."
+            .into();
     };
     let Some([(long, _), _]) = half_axes(last) else { return String::new() };
     let unit = length(long);
-    let drawn = if visible { "Ellipses hold the position with 95 %" } else { "The 95 % ellipses are too small to draw" };
+    let drawn = if visible {
+        "Ellipses hold the position with 95 %"
+    } else {
+        "The 95 % ellipses are too small to draw"
+    };
     format!(
-        "{drawn}; they grow because every step adds its uncertainty (taken as independent), at the end to ±{} {} along the longer axis.",
-        significant(long * unit.factor, 2),
-        unit.name
+        "{drawn}; they grow because every step adds its uncertainty (taken as independent), at the end to ±{} along the longer axis.",
+        unit.show(long * unit.factor, 2)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector6;
+
+    use super::super::tests::{Run, motion};
+    use super::*;
+
+    /// Poses from motions, as the trajectory is built.
+    fn poses(phis: &[Vector6<f64>]) -> Vec<RigidMotion> {
+        let mut all = vec![RigidMotion::identity()];
+        for phi in phis {
+            let last = all[all.len() - 1];
+            all.push(last.after(&Twist::from_vector(phi).exp().inverse()));
+        }
+        all
+    }
+
+    #[test]
+    fn covariance_of_the_position_is_that_of_differences() {
+        let mut phis: Vec<Vector6<f64>> = (0..5)
+            .map(|k| Vector6::new(0.1, -0.05, -0.4, 0.02, 0.3, -0.1) * (1.0 + 0.3 * f64::from(k)))
+            .collect();
+        let mut run = Run::of(&phis);
+        let cov = Matrix6::from_fn(|i, j| if i == j { 1e-4 * (1 + i) as f64 } else { 2e-5 });
+        for row in &mut run.rows {
+            if let Some(estimate) = &mut row.motion {
+                estimate.theta.cov = cov;
+            }
+        }
+        run.poses = poses(&phis);
+        let found = position_covariances(&run.report()).last().copied().flatten().unwrap();
+        let mut expected = Matrix2::zeros();
+        for k in 0..phis.len() {
+            let mut jacobian = nalgebra::SMatrix::<f64, 2, 6>::zeros();
+            for c in 0..6 {
+                let mut at = |step: f64| {
+                    phis[k][c] += step;
+                    let end = poses(&phis)[phis.len()].translation;
+                    phis[k][c] -= step;
+                    nalgebra::Vector2::new(end.x, end.z)
+                };
+                jacobian.set_column(c, &((at(1e-6) - at(-1e-6)) / 2e-6));
+            }
+            expected += jacobian * cov * jacobian.transpose();
+        }
+        assert!((found - expected).norm() < 1e-6 * expected.norm(), "{found} {expected}");
+    }
+
+    #[test]
+    fn a_gap_that_no_interval_bridges_ends_the_ellipses() {
+        let phis = vec![Vector6::new(0.0, 0.0, -0.1, 0.0, 0.0, 0.0); 4];
+        let mut run = Run::of(&phis);
+        run.rows[2].motion = None;
+        run.rows[2].status = "few_rows".into();
+        let known =
+            |run: &Run| position_covariances(&run.report()).iter().map(Option::is_some).collect::<Vec<_>>();
+        assert_eq!(known(&run), [true, true, true, false, false]);
+        run.rows[3].dt_s = Some(0.2);
+        assert_eq!(known(&run), [true; 5]);
+        run.rows[4].motion = Some(motion(&phis[0], f64::INFINITY));
+        assert_eq!(known(&run), [true, true, true, true, false]);
+    }
+
+    #[test]
+    fn truth_starts_where_the_estimate_does() {
+        let phis = vec![Vector6::new(0.1, 0.0, -0.2, 0.0, 0.2, 0.0); 3];
+        let estimate = poses(&phis);
+        let elsewhere = Twist::from_vector(&Vector6::new(5.0, 1.0, 2.0, 0.3, 0.2, 0.1)).exp();
+        let truth: Vec<_> = estimate.iter().map(|pose| elsewhere.after(pose)).collect();
+        for (a, b) in aligned(&truth, &estimate).iter().zip(&estimate) {
+            assert!((a.translation - b.translation).norm() < 1e-12);
+        }
+    }
 }
