@@ -7,7 +7,7 @@ use super::charts::{clip_path, cursor, time_axes, unanswered, vertical, view_box
 use super::plot::{Axes, Scale, extent, path};
 
 /// Width and height of the chart, in SVG units.
-const SIZE: (f64, f64) = (440.0, 420.0);
+const SIZE: (f64, f64) = (380.0, 375.0);
 
 /// One frame's answer: when, how long, and from when to when.
 struct Answer {
@@ -38,7 +38,7 @@ pub fn chart(report: &Report<'_>) -> Option<Markup> {
     let dots = answers.len() <= 80;
     Some(html! {
         svg viewBox=(view_box(SIZE)) role="img" aria-label="time to impact of the nearest obstacle" {
-            (axes.grid(x_name, "", (7, 8)))
+            (axes.grid(x_name, "", (6, 7)))
             (clip_path("clip-impact", &axes))
             g clip-path="url(#clip-impact)" {
                 path class="interval" stroke-width=(format!("{bar_px:.1}")) d=(intervals(false)) {}

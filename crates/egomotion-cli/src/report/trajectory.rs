@@ -9,9 +9,9 @@ use super::number::length;
 use super::plot::{Axes, MARGIN, Scale, extent, path};
 
 /// Width of the chart, in SVG units.
-const WIDTH: f64 = 440.0;
+const WIDTH: f64 = 380.0;
 /// Least and greatest height.
-const HEIGHTS: (f64, f64) = (300.0, 440.0);
+const HEIGHTS: (f64, f64) = (260.0, 390.0);
 /// About so many ellipses along the path.
 const ELLIPSES: usize = 10;
 /// 95 % quantile of χ² with two degrees of freedom.
@@ -33,7 +33,7 @@ pub fn chart(report: &Report<'_>) -> Markup {
     let ends = [report.poses.first().zip(Some("start")), report.poses.last().zip(Some("end"))];
     html! {
         svg viewBox=(format!("0 0 {WIDTH} {height:.1}")) role="img" aria-label="path of the camera from above" {
-            (axes.grid("X, to the right (m)", "Z, forward (m)", (6, 6)))
+            (axes.grid("X, to the right (m)", "Z, forward (m)", (5, 6)))
             path class="true" d=(path(truth.iter().map(place))) {}
             @for ellipse in &ellipses { (ellipse.markup()) }
             path class="line" d=(path(report.poses.iter().map(place))) {}
