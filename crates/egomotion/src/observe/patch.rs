@@ -113,10 +113,11 @@ impl Patch {
                 return None;
             }
             let (mut pull_u, mut pull_v, mut sum) = (0.0_f32, 0.0_f32, 0.0_f32);
-            for i in 0..AREA {
-                let difference = self.values[i] - gain * window[i];
-                pull_u += self.du[i] * difference;
-                pull_v += self.dv[i] * difference;
+            for (((&value, &there), &du), &dv) in self.values.iter().zip(&window).zip(&self.du).zip(&self.dv)
+            {
+                let difference = value - gain * there;
+                pull_u += du * difference;
+                pull_v += dv * difference;
                 sum += difference * difference;
             }
             let step = inverse * Vector2::new(f64::from(pull_u), f64::from(pull_v)) * scale;
