@@ -57,27 +57,23 @@ impl DensePair<'_> {
     }
 
     /// The tracked point of a pixel: (x, y, d) before, and where flow and the later map put it after.
+    ///
+    /// Each image localises the point with noise of its own: half of flow's covariance is that of the
+    /// earlier image, half that of the later one, and the left image's share is in x and in d alike.
     pub fn stereo_track(&self, u: usize, v: usize) -> Option<StereoTrack> {
-        let before = self.before(u, v)?;
+        let mut before = self.before(u, v)?;
         let moved = self.displacement(u, v)?;
         let (x, y) = (before.mean.x + moved.mean.x, before.mean.y + moved.mean.y);
         let (later, gradient) = disparity_at(self.rig, self.after, x, y)?;
+        let half = 0.5 * moved.cov;
+        let shared = |d_variance: f64| 0.5 * d_variance.min(half[(0, 0)]);
+        before.cov = joint(&half, Vector2::new(shared(before.cov[(2, 2)]), 0.0), before.cov[(2, 2)]);
         // d′ is read where flow says, so an error of flow moves it along the map's slope.
-        let cross = moved.cov * gradient;
-        let var = later.variance() + gradient.dot(&cross);
-        let c = &moved.cov;
-        let cov = Matrix3::new(
-            c[(0, 0)],
-            c[(0, 1)],
-            cross.x, //
-            c[(0, 1)],
-            c[(1, 1)],
-            cross.y, //
-            cross.x,
-            cross.y,
-            var,
-        );
-        Some(StereoTrack { before, after: Gaussian { mean: Vector3::new(x, y, later.value()), cov } })
+        let own = Vector2::new(shared(later.variance()), 0.0);
+        let slope = half * gradient;
+        let variance = later.variance() + gradient.dot(&slope) + 2.0 * own.dot(&gradient).max(0.0);
+        let after = Gaussian { mean: Vector3::new(x, y, later.value()), cov: joint(&half, own + slope, variance) };
+        Some(StereoTrack { before, after })
     }
 
     /// Discrete DCCE: disparity at the pixel at t and t′, its gradient at t′, and the displacement.
@@ -166,6 +162,15 @@ impl DensePair<'_> {
         let mean = Vector4::new(d, left.mean.x, left.mean.y, right_x);
         (d > 0.0).then_some(StereoFlow { x_px: x, y_px: y, measured: Gaussian { mean, cov } })
     }
+}
+
+/// The covariance of (x, y, d) from that of (x, y), its covariance with d, and the variance of d.
+fn joint(place: &Matrix2<f64>, cross: Vector2<f64>, variance: f64) -> Matrix3<f64> {
+    Matrix3::new(
+        place[(0, 0)], place[(0, 1)], cross.x, //
+        place[(0, 1)], place[(1, 1)], cross.y, //
+        cross.x, cross.y, variance,
+    )
 }
 
 /// Disparity at image coordinates (x, y) with its variance, and its gradient there by central differences.
