@@ -14,7 +14,7 @@ use crate::Ending;
 use crate::args::DemoArgs;
 use crate::feed::Fetched;
 use crate::judge::MapTally;
-use crate::results::ResultFolder;
+use crate::results::{About, ResultFolder};
 use crate::run::set_threads;
 use crate::session::{Outcome, Row, Session, progress, stop_signal};
 use crate::summary::Summary;
@@ -54,7 +54,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         &stop,
         &folder,
         |k| render(&sequence, &noise, k),
-        |row, _| {
+        |row| {
             if row.motion.frame > 0 {
                 verdicts.add(&sequence, row);
                 session.progress.suspend(|| writeln!(std::io::stdout(), "{}", line(row)))?;
@@ -66,6 +66,14 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
     let mut summary = Summary::new("demo".into(), sequence.rig, &config, &outcome);
     summary.truth_maps = verdicts.vz.verdict();
     folder.write_json("summary.json", &summary)?;
+    let about = About {
+        title: "A robot's drive through a rendered room",
+        source: "rendered by egomotion demo",
+        command: "egomotion demo".into(),
+        config: &config,
+        rig: &sequence.rig,
+    };
+    folder.write_report(&about, &outcome)?;
     print_verdict(&mut stdout, &outcome, &summary, &verdicts, &out)?;
     Ok(if outcome.complete { Ending::Done } else { Ending::Interrupted })
 }

@@ -6,6 +6,7 @@ mod evaluate;
 mod feed;
 mod info;
 mod judge;
+mod report;
 mod results;
 mod run;
 mod session;

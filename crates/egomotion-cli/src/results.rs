@@ -4,11 +4,14 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use egomotion::geometry::StereoRig;
+use egomotion::pipeline::Config;
 use egomotion::pipeline::stereo::DenseResults;
 use egomotion_io::trajectory::{Pose, write_kitti, write_tum};
 use egomotion_io::{flo, pfm, write};
 use serde::Serialize;
 
+use crate::report::{self, FrameRow, Report};
 use crate::session::{Outcome, Row};
 
 /// A folder that results go to.
@@ -89,6 +92,50 @@ impl ResultFolder {
         write_tum(&self.path.join("trajectory_tum.txt"), &poses)?;
         write_kitti(&self.path.join("trajectory_kitti.txt"), &poses)?;
         self.write("motion.csv", motion_table(&outcome.rows)?.as_bytes())
+    }
+}
+
+/// What the report says of a run beside its results.
+pub struct About<'a> {
+    pub title: &'a str,
+    pub source: &'a str,
+    /// The command that repeats the run.
+    pub command: String,
+    pub config: &'a Config,
+    pub rig: &'a StereoRig,
+}
+
+impl ResultFolder {
+    /// Write `report.html`.
+    pub fn write_report(&self, about: &About<'_>, outcome: &Outcome) -> Result<()> {
+        let frames: Vec<FrameRow> = outcome
+            .rows
+            .iter()
+            .map(|row| FrameRow {
+                frame: row.index,
+                time_s: row.motion.time_s,
+                dt_s: row.motion.dt_s,
+                motion: row.motion.motion.as_ref().ok().copied(),
+                truth: row.truth,
+                impact: row.motion.impact,
+                status: status(row).to_owned(),
+            })
+            .collect();
+        let page = report::render(&Report {
+            title: about.title.to_owned(),
+            source: about.source.to_owned(),
+            command: about.command.clone(),
+            settings_toml: toml::to_string(about.config).context("cannot put the settings into TOML")?,
+            rig: about.rig,
+            frames: &frames,
+            poses: outcome.trajectory.poses(),
+            truth: outcome.truth.as_deref(),
+            pictures: outcome.album.pictures(),
+            stages_ms: outcome.stages_ms.clone(),
+            frame_ms: outcome.frame_ms,
+            notes: Vec::new(),
+        });
+        self.write("report.html", page.as_bytes())
     }
 }
 

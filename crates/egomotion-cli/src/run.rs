@@ -13,7 +13,7 @@ use egomotion_io::source::{FrameFiles, Sequence, Source};
 use crate::args::RunArgs;
 use crate::feed;
 use crate::judge::{self, MapVerdict};
-use crate::results::ResultFolder;
+use crate::results::{About, ResultFolder};
 use crate::session::{Session, progress, stop_signal};
 use crate::summary::{Index, SceneEntry, Summary};
 use crate::{Ending, Usage};
@@ -146,8 +146,8 @@ fn run_sequence(
     let outcome = session.run(
         stop,
         &folder,
-        |k| feed::read(&frames[k].0, frames[k].1),
-        |row, _| {
+        |k| feed::read(frames[k].0, frames[k].1),
+        |row| {
             if let Err(why) = &row.motion.motion
                 && row.motion.frame > 0
             {
@@ -167,6 +167,14 @@ fn run_sequence(
     let mut summary = Summary::new(args.source.display().to_string(), rig, config, &outcome);
     summary.truth_maps = truth_maps;
     folder.write_json("summary.json", &summary)?;
+    let about = About {
+        title: &sequence.name,
+        source: &summary.source,
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+        config,
+        rig: &rig,
+    };
+    folder.write_report(&about, &outcome)?;
     Ok(DoneSequence { summary, first_failure })
 }
 

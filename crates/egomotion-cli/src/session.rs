@@ -11,6 +11,7 @@ use egomotion::pipeline::{Config, FrameMotion, StereoFrame, StereoMotion, Trajec
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::feed::{Fetched, with_frames};
+use crate::report::{Album, FramePictures};
 use crate::results::ResultFolder;
 
 /// What is to be run.
@@ -41,6 +42,8 @@ pub struct Outcome {
     pub trajectory: Trajectory,
     /// True poses, relative to the first frame; only if every frame has one.
     pub truth: Option<Vec<RigidMotion>>,
+    /// Pictures of some frames, for the report.
+    pub album: Album,
     pub complete: bool,
     pub stages_ms: Vec<(&'static str, f64)>,
     pub frame_ms: f64,
@@ -68,13 +71,13 @@ pub fn progress(frames: usize, quiet: bool) -> ProgressBar {
 }
 
 impl Session<'_> {
-    /// Push every frame through the pipeline; `look` sees each answer with its maps and the earlier left image.
+    /// Push every frame through the pipeline; `look` sees each answer with its maps.
     pub fn run(
         &self,
         stop: &AtomicBool,
         out: &ResultFolder,
         fetch: impl Fn(usize) -> Fetched + Sync,
-        mut look: impl FnMut(&Row, Option<&Image>) -> Result<()>,
+        mut look: impl FnMut(&Row) -> Result<()>,
     ) -> Result<Outcome> {
         let mut pipeline = StereoMotion::new(self.rig, self.config.clone())?;
         pipeline.set_mask(self.mask.clone());
@@ -84,6 +87,7 @@ impl Session<'_> {
         let mut trajectory = Trajectory::new();
         let mut truths: Vec<Option<RigidMotion>> = Vec::new();
         let mut reference_image: Option<(usize, Image)> = None;
+        let mut album = Album::default();
         with_frames(self.frames, stop, fetch, |frames| -> Result<()> {
             for fetched in frames {
                 let Fetched { index, time_s, pair, truth, decode_ms } = fetched;
@@ -106,11 +110,13 @@ impl Session<'_> {
                 let mut row = Row { index, motion, truth: true_motion };
                 let writing = Instant::now();
                 let earlier = reference_image.as_ref().filter(|(f, _)| Some(*f) == reference);
-                look(&row, earlier.map(|(_, image)| image))?;
-                if self.maps
-                    && let (Some(dense), Some(r)) = (&row.motion.dense, reference)
-                {
-                    out.write_maps(rows.get(r).map_or(r, |row| row.index), dense)?;
+                look(&row)?;
+                if let (Some(dense), Some((r, image))) = (&row.motion.dense, earlier) {
+                    let index = rows.get(*r).map_or(*r, |row| row.index);
+                    album.offer(|| FramePictures::new(index, image, dense));
+                    if self.maps {
+                        out.write_maps(index, dense)?;
+                    }
                 }
                 tally.aside_ms += writing.elapsed().as_secs_f64() * 1e3;
                 // Maps are large; a long run keeps only its rows.
@@ -136,6 +142,7 @@ impl Session<'_> {
             rows,
             trajectory,
             truth,
+            album,
             stages_ms: tally.means(count),
             frame_ms: (wall_ms - tally.aside_ms) / count,
             wall_s: wall_ms / 1e3,

@@ -59,36 +59,46 @@ impl VehicleWindow {
     }
 }
 
-/// One point that may become an obstacle.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Candidate {
-    /// Its looming.
-    pub impact: TimeToImpact,
-    /// Block of neighbouring pixels that it lies in.
-    pub block: usize,
+/// The points seen in one block of neighbouring pixels.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Neighbourhood {
+    /// Time to impact of the points that will cross the vehicle's window.
+    pub crossing: Vec<TimeToImpact>,
+    /// Number of all points with an answer.
+    pub seen: usize,
 }
 
-/// Fewest points that make an obstacle: one or two may be mismatches.
-const LEAST_POINTS: usize = 3;
+impl Neighbourhood {
+    /// Count one point: its time to impact if it will cross the window.
+    pub fn add(&mut self, crossing: Option<TimeToImpact>) {
+        self.seen += 1;
+        self.crossing.extend(crossing);
+    }
+}
 
-/// The nearest obstacle: of all blocks with at least three points, the one whose median looming is largest.
+/// Fewest crossing points that make an obstacle: one or two may be mismatches.
+const LEAST_POINTS: usize = 3;
+/// Least share of a block's points that must cross: a mismatched patch does not fill a block.
+const LEAST_SHARE: f64 = 0.3;
+
+/// The nearest obstacle: of all blocks whose points mostly or partly cross the window (at least
+/// three of them and 30 %), the one whose median looming is largest.
 ///
 /// Its σ is that of the block's median point, not divided by the number of points, because
 /// neighbours share their noise.
-pub fn nearest(candidates: &[Candidate]) -> Option<TimeToImpact> {
-    let blocks = candidates.iter().map(|c| c.block + 1).max()?;
-    let mut members: Vec<Vec<TimeToImpact>> = vec![Vec::new(); blocks];
-    for candidate in candidates {
-        members[candidate.block].push(candidate.impact);
-    }
-    members
+pub fn nearest(blocks: &mut [Neighbourhood]) -> Option<TimeToImpact> {
+    let by_looming = |a: &TimeToImpact, b: &TimeToImpact| a.looming.value().total_cmp(&b.looming.value());
+    blocks
         .iter_mut()
-        .filter(|block| block.len() >= LEAST_POINTS)
-        .map(|block| {
-            let middle = block.len() / 2;
-            *block.select_nth_unstable_by(middle, |a, b| a.looming.value().total_cmp(&b.looming.value())).1
+        .filter(|block| {
+            let count = block.crossing.len();
+            count >= LEAST_POINTS && count as f64 >= LEAST_SHARE * block.seen as f64
         })
-        .max_by(|a, b| a.looming.value().total_cmp(&b.looming.value()))
+        .map(|block| {
+            let middle = block.crossing.len() / 2;
+            *block.crossing.select_nth_unstable_by(middle, by_looming).1
+        })
+        .max_by(by_looming)
 }
 
 #[cfg(test)]
@@ -110,14 +120,16 @@ mod tests {
         assert_eq!(impact(-0.1, 0.02).interval95_s(), None);
     }
 
+    fn block(loomings: &[f64], seen: usize) -> Neighbourhood {
+        Neighbourhood { crossing: loomings.iter().map(|&l| impact(l, 0.01)).collect(), seen }
+    }
+
     #[test]
     fn single_points_make_no_obstacle() {
-        let point = |looming: f64, block: usize| Candidate { impact: impact(looming, 0.01), block };
-        let mut points = vec![point(9.0, 0), point(9.0, 0)];
-        assert_eq!(nearest(&points), None);
-        points.extend([0.4, 0.5, 0.6].map(|l| point(l, 3)));
-        points.extend([0.1, 0.2, 0.3].map(|l| point(l, 5)));
-        assert_eq!(nearest(&points).unwrap().looming.value(), 0.5);
+        let mut blocks = vec![block(&[9.0, 9.0], 2), block(&[8.0, 8.0, 8.0], 100)];
+        assert_eq!(nearest(&mut blocks), None);
+        blocks.extend([block(&[0.4, 0.6, 0.5], 5), block(&[0.1, 0.2, 0.3], 3)]);
+        assert_eq!(nearest(&mut blocks).unwrap().looming.value(), 0.5);
     }
 
     #[test]

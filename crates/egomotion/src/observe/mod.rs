@@ -7,6 +7,7 @@ pub mod observation;
 pub mod patch;
 pub mod pyramid;
 pub mod sample;
+pub mod spline;
 pub mod tracks;
 
 pub use disparity::{DisparityMap, DisparityMatcher, DisparityOptions};

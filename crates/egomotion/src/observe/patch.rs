@@ -1,10 +1,11 @@
 //! A small window of an image, located in another one to a fraction of a pixel.
 //!
-//! Inverse-compositional Lucas–Kanade with cubic interpolation. Both windows are reduced to zero
-//! mean and equal contrast, so that gain and offset between cameras or exposures do not matter.
+//! Inverse-compositional Lucas–Kanade on images given as spline coefficients ([`super::spline`]).
+//! Both windows are reduced to zero mean and equal contrast, so that gain and offset between cameras or exposures do not matter.
 
 use nalgebra::{Matrix2, Vector2};
 
+use super::spline;
 use crate::geometry::Image;
 
 /// Half the side of a window, in pixels.
@@ -48,7 +49,7 @@ pub struct Located {
 }
 
 impl Patch {
-    /// The window around (u, v), in pixels; `None` near the border or without any contrast.
+    /// The window of an image (as spline coefficients) around (u, v), in pixels; `None` near the border or without any contrast.
     pub fn new(image: &Image, u: f64, v: f64) -> Option<Self> {
         let mut wide = [0.0; WIDE * WIDE];
         sample_window::<WIDE>(image, u, v, 1.0, &mut wide)?;
@@ -84,7 +85,7 @@ impl Patch {
         f64::from(self.contrast)
     }
 
-    /// Find the window in `image` from a start (u, v), in pixels.
+    /// Find the window in `image` (as spline coefficients) from a start (u, v), in pixels.
     ///
     /// `scale` is the expected magnification there. `None` if it leaves the image, has no contrast
     /// there, is not locatable, or has not settled after `iterations`.
@@ -113,10 +114,11 @@ impl Patch {
                 return None;
             }
             let (mut pull_u, mut pull_v, mut sum) = (0.0_f32, 0.0_f32, 0.0_f32);
-            for i in 0..AREA {
-                let difference = self.values[i] - gain * window[i];
-                pull_u += self.du[i] * difference;
-                pull_v += self.dv[i] * difference;
+            for (((&value, &there), &du), &dv) in self.values.iter().zip(&window).zip(&self.du).zip(&self.dv)
+            {
+                let difference = value - gain * there;
+                pull_u += du * difference;
+                pull_v += dv * difference;
                 sum += difference * difference;
             }
             let step = inverse * Vector2::new(f64::from(pull_u), f64::from(pull_v)) * scale;
@@ -141,12 +143,6 @@ fn standardise(values: &mut [f32; AREA]) -> Option<f32> {
     (deviation > 0.1 && deviation.is_finite()).then_some(deviation)
 }
 
-/// Keys' cubic weights (a = −½) for the fraction `t` of a pixel.
-fn cubic(t: f32) -> [f32; 4] {
-    let (t2, t3) = (t * t, t * t * t);
-    [-0.5 * t + t2 - 0.5 * t3, 1.0 - 2.5 * t2 + 1.5 * t3, 0.5 * t + 2.0 * t2 - 1.5 * t3, -0.5 * t2 + 0.5 * t3]
-}
-
 /// Sample an N×N window of spacing `scale` around (u, v); `None` unless it lies inside with a margin.
 fn sample_window<const N: usize>(image: &Image, u: f64, v: f64, scale: f64, out: &mut [f32]) -> Option<()> {
     let half = (N / 2) as f64 * scale;
@@ -157,7 +153,7 @@ fn sample_window<const N: usize>(image: &Image, u: f64, v: f64, scale: f64, out:
     }
     let place = |c: f64, k: usize| {
         let at = c - half + k as f64 * scale;
-        (at as usize - 1, cubic((at - at.floor()) as f32))
+        (at as usize - 1, spline::weights((at - at.floor()) as f32))
     };
     let columns: [(usize, [f32; 4]); N] = std::array::from_fn(|k| place(u, k));
     let first = columns[0].0;
@@ -192,7 +188,9 @@ mod tests {
     }
 
     fn image(shift: (f64, f64), gain: f32, offset: f32) -> Image {
-        Grid::from_fn(96, 80, |u, v| gain * texture(u as f64 - shift.0, v as f64 - shift.1) + offset)
+        spline::coefficients(&Grid::from_fn(96, 80, |u, v| {
+            gain * texture(u as f64 - shift.0, v as f64 - shift.1) + offset
+        }))
     }
 
     #[test]
@@ -209,9 +207,9 @@ mod tests {
 
     #[test]
     fn a_magnified_patch_is_found_with_its_scale() {
-        let zoomed = Grid::from_fn(96, 80, |u, v| {
+        let zoomed = spline::coefficients(&Grid::from_fn(96, 80, |u, v| {
             texture(40.0 + (u as f64 - 43.0) / 1.1, 41.0 + (v as f64 - 40.0) / 1.1)
-        });
+        }));
         let patch = Patch::new(&image((0.0, 0.0), 1.0, 0.0), 40.0, 41.0).unwrap();
         let found = patch.locate(&zoomed, (42.0, 41.0), 1.1, Freedom::Plane, 20).unwrap();
         assert!((found.u - 43.0).abs() < 0.02 && (found.v - 40.0).abs() < 0.02, "{found:?}");
@@ -234,15 +232,15 @@ mod tests {
         use rand_distr::{Distribution, Normal};
         let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(5);
         let noise = Normal::new(0.0, 2.0).unwrap();
-        let clean = image((0.0, 0.0), 1.0, 0.0);
-        let shifted = image((0.37, 0.61), 1.0, 0.0);
+        let grey = |(a, b): (f64, f64)| Grid::from_fn(96, 80, |u, v| texture(u as f64 - a, v as f64 - b));
+        let (clean, shifted) = (grey((0.0, 0.0)), grey((0.37, 0.61)));
         let mut squares = [0.0; 2];
         let n = 400;
         for _ in 0..n {
             let mut noisy = |image: &Image| {
                 let mut out = image.clone();
                 out.values_mut().iter_mut().for_each(|v| *v += noise.sample(&mut rng) as f32);
-                out
+                spline::coefficients(&out)
             };
             let patch = Patch::new(&noisy(&clean), 40.0, 41.0).unwrap();
             let found = patch.locate(&noisy(&shifted), (40.0, 41.0), 1.0, Freedom::Plane, 30).unwrap();

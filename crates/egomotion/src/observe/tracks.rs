@@ -13,6 +13,7 @@ use super::corners::{Corner, corners};
 use super::observation::StereoTrack;
 use super::patch::{Freedom, Located, Patch};
 use super::pyramid::{Gradients, Pyramid, gradients, smooth};
+use super::spline::coefficients;
 use crate::geometry::{Field, Gaussian, Grid, Image, StereoRig, Twist};
 
 /// How corners are found and followed.
@@ -58,6 +59,10 @@ pub struct StereoPyramid {
     pub right: Pyramid,
     /// Gradients of the left image.
     pub gradients: Gradients,
+    /// Spline coefficients of the left image.
+    pub left_spline: Image,
+    /// Spline coefficients of the right image.
+    pub right_spline: Image,
 }
 
 impl StereoPyramid {
@@ -66,7 +71,9 @@ impl StereoPyramid {
         let (left, right) = rayon::join(|| smooth(&left), || smooth(&right));
         let gradients = gradients(&left);
         let (left, right) = rayon::join(|| Pyramid::new(left, levels), || Pyramid::new(right, levels));
-        Self { left, right, gradients }
+        let (left_spline, right_spline) =
+            rayon::join(|| coefficients(&left.levels()[0]), || coefficients(&right.levels()[0]));
+        Self { left, right, gradients, left_spline, right_spline }
     }
 }
 
@@ -122,18 +129,17 @@ struct Follower<'a> {
 impl Follower<'_> {
     fn trace(&self, corner: &Corner) -> Option<Trace> {
         let (u, v) = (corner.u as f64, corner.v as f64);
-        let patch = Patch::new(&self.before.left.levels()[0], u, v)?;
+        let patch = Patch::new(&self.before.left_spline, u, v)?;
         let shift = match self.hints.shift {
             Some(field) => f64::from(field.get(corner.u, corner.v)?),
             None => search_row(self.before, corner, self.options.largest_disparity_px)?,
         };
-        let right = self.across(&patch, &self.before.right, &self.before.left, (u, v), shift)?;
+        let right = self.across(&patch, self.before, (u, v), shift)?;
         let shift = u - right.u;
         let (next, scale) = self.in_time(&patch, (u, v), shift)?;
-        let patch_after = Patch::new(&self.after.left.levels()[0], next.u, next.v)?;
+        let patch_after = Patch::new(&self.after.left_spline, next.u, next.v)?;
         let shift_guess = shift * scale;
-        let right_after =
-            self.across(&patch_after, &self.after.right, &self.after.left, (next.u, next.v), shift_guess)?;
+        let right_after = self.across(&patch_after, self.after, (next.u, next.v), shift_guess)?;
         let shape = patch.covariance_shape()?;
         let shape_after = patch_after.covariance_shape()?;
         Some(Trace {
@@ -152,18 +158,17 @@ impl Follower<'_> {
     fn across(
         &self,
         patch: &Patch,
-        right: &Pyramid,
-        left: &Pyramid,
+        frame: &StereoPyramid,
         (u, v): (f64, f64),
         shift: f64,
     ) -> Option<Located> {
         let n = self.options.iterations;
-        let found = patch.locate(&right.levels()[0], (u - shift, v), 1.0, Freedom::Row, n)?;
+        let found = patch.locate(&frame.right_spline, (u - shift, v), 1.0, Freedom::Row, n)?;
         if !self.acceptable(patch, &found) || self.rig.disparity_from_shift(u - found.u) <= 0.0 {
             return None;
         }
-        let back = Patch::new(&right.levels()[0], found.u, found.v)?;
-        let home = back.locate(&left.levels()[0], (u, v), 1.0, Freedom::Row, n)?;
+        let back = Patch::new(&frame.right_spline, found.u, found.v)?;
+        let home = back.locate(&frame.left_spline, (u, v), 1.0, Freedom::Row, n)?;
         ((home.u - u).abs() <= self.options.back_tolerance_px).then_some(found)
     }
 
@@ -174,12 +179,12 @@ impl Follower<'_> {
             None => (self.coarse_to_fine((u, v))?, 1.0),
         };
         let n = self.options.iterations;
-        let found = patch.locate(&self.after.left.levels()[0], start, scale, Freedom::Plane, n)?;
+        let found = patch.locate(&self.after.left_spline, start, scale, Freedom::Plane, n)?;
         if !self.acceptable(patch, &found) {
             return None;
         }
-        let back = Patch::new(&self.after.left.levels()[0], found.u, found.v)?;
-        let home = back.locate(&self.before.left.levels()[0], (u, v), 1.0 / scale, Freedom::Plane, n)?;
+        let back = Patch::new(&self.after.left_spline, found.u, found.v)?;
+        let home = back.locate(&self.before.left_spline, (u, v), 1.0 / scale, Freedom::Plane, n)?;
         let distance = (home.u - u).hypot(home.v - v);
         (distance <= self.options.back_tolerance_px).then_some((found, scale))
     }

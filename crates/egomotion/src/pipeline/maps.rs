@@ -1,13 +1,14 @@
 //! The dense maps of a frame pair: depth velocity and time to impact of every pixel, each with its σ.
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::config::{Approach, Config, Method};
 use crate::estimate::{Blocks, MotionEstimate};
-use crate::geometry::{Field, Grid};
+use crate::geometry::{Field, Grid, StereoRig};
 use crate::motion::DepthVelocity;
 use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
-use crate::motion::impact::{Candidate, TimeToImpact};
+use crate::motion::impact::{Neighbourhood, TimeToImpact};
 use crate::observe::{DensePair, StereoTrack};
 
 /// Per-pixel results on the pixel grid of the earlier frame; missing pixels are NaN.
@@ -25,13 +26,15 @@ pub struct MotionMaps {
     pub impact_hi: Grid<f32>,
 }
 
-/// Both of what one pixel shows.
+/// What one pixel shows.
 struct Pixel {
     velocity: DepthVelocity,
     impact: Option<TimeToImpact>,
+    /// Whether it will pass through the vehicle's window.
+    crosses: bool,
 }
 
-/// VZ and time to impact of every pixel, and the candidates for the nearest obstacle.
+/// VZ and time to impact of every pixel, and the nearest obstacle's points by block.
 ///
 /// With `dcce` and `dv` VZ is that method's own measurement at each pixel; with the others it is
 /// the rigid scene's, except where the measured change of disparity contradicts it.
@@ -40,37 +43,53 @@ pub fn motion_maps(
     motion: Option<&MotionEstimate>,
     config: &Config,
     dt_s: f64,
-) -> (MotionMaps, Vec<Candidate>) {
+) -> (MotionMaps, Vec<Neighbourhood>) {
     let (width, height) = pair.flow.size();
     let rigid = motion.and_then(|m| RigidPrediction::new(&m.theta, pair.rig));
     let blocks = Blocks::over(pair.rig, config.block_px);
-    let rows: Vec<(Vec<Option<Pixel>>, Vec<Candidate>)> = (0..height)
+    let rows: Vec<Vec<Option<Pixel>>> = (0..height)
         .into_par_iter()
-        .map(|v| {
-            let mut candidates = Vec::new();
-            let pixels = (0..width)
-                .map(|u| {
-                    let velocity = velocity_at(pair, rigid.as_ref(), config, u, v)?;
-                    let impact = velocity.looming(dt_s).map(|looming| TimeToImpact { looming });
-                    candidates.extend(candidate(
-                        pair,
-                        rigid.as_ref(),
-                        config,
-                        &blocks,
-                        (u, v),
-                        &velocity,
-                        dt_s,
-                    ));
-                    Some(Pixel { velocity, impact })
-                })
-                .collect();
-            (pixels, candidates)
-        })
+        .map(|v| (0..width).map(|u| pixel_at(pair, rigid.as_ref(), config, (u, v), dt_s)).collect())
         .collect();
-    (
-        fill(width, height, rows.iter().map(|(pixels, _)| pixels)),
-        rows.into_iter().flat_map(|(_, c)| c).collect(),
-    )
+    let mut seen = vec![Neighbourhood::default(); blocks.count()];
+    for (v, row) in rows.iter().enumerate() {
+        for (u, pixel) in row.iter().enumerate() {
+            let (x, y) = pair.rig.image_from_pixel(u as f64, v as f64);
+            if let Some(pixel) = pixel {
+                seen[blocks.index(x, y)].add(pixel.impact.filter(|_| pixel.crosses));
+            }
+        }
+    }
+    (fill(width, height, &rows), seen)
+}
+
+fn pixel_at(
+    pair: &DensePair<'_>,
+    rigid: Option<&RigidPrediction<'_>>,
+    config: &Config,
+    (u, v): (usize, usize),
+    dt_s: f64,
+) -> Option<Pixel> {
+    let velocity = velocity_at(pair, rigid, config, u, v)?;
+    let impact = velocity.looming(dt_s).map(|looming| TimeToImpact { looming });
+    let (x, y) = pair.rig.image_from_pixel(u as f64, v as f64);
+    let before = Vector3::new(x, y, pair.rig.focal_px) * (velocity.z_vz.mean.x / pair.rig.focal_px);
+    let crosses =
+        rigid.zip(impact).is_some_and(|(rigid, impact)| crosses(rigid, &before, &impact, config, dt_s));
+    Some(Pixel { velocity, impact, crosses })
+}
+
+/// Whether a point will pass through the vehicle's window.
+fn crosses(
+    rigid: &RigidPrediction<'_>,
+    before: &Vector3<f64>,
+    impact: &TimeToImpact,
+    config: &Config,
+    dt_s: f64,
+) -> bool {
+    let later = rigid.motion().apply(before);
+    let velocity = (later - before) / dt_s;
+    impact.seconds().is_some_and(|seconds| config.window.is_crossed_by(&later, &velocity, seconds))
 }
 
 fn velocity_at(
@@ -96,59 +115,41 @@ fn velocity_at(
                 let sigma = f64::from(pair.before.sigma.get(u, v)?);
                 let d = pair.rig.disparity_from_shift(f64::from(pair.before.shift.get(u, v)?));
                 let (x, y) = pair.rig.image_from_pixel(u as f64, v as f64);
-                rigid.depth_velocity(&nalgebra::Vector3::new(x, y, d), sigma)
+                rigid.depth_velocity(&Vector3::new(x, y, d), sigma)
             });
             rigid_unless_moving(measured, predicted)
         }
     }
 }
 
-/// The pixel as an obstacle, if it crosses the vehicle's window.
-fn candidate(
-    pair: &DensePair<'_>,
-    rigid: Option<&RigidPrediction<'_>>,
-    config: &Config,
-    blocks: &Blocks,
-    (u, v): (usize, usize),
-    velocity: &DepthVelocity,
-    dt_s: f64,
-) -> Option<Candidate> {
-    let impact = TimeToImpact { looming: velocity.looming(dt_s)? };
-    let seconds = impact.seconds()?;
-    let (x, y) = pair.rig.image_from_pixel(u as f64, v as f64);
-    let before = nalgebra::Vector3::new(x, y, pair.rig.focal_px) * (velocity.z_vz.mean.x / pair.rig.focal_px);
-    let later = rigid?.motion().apply(&before);
-    let crosses = config.window.is_crossed_by(&later, &((later - before) / dt_s), seconds);
-    crosses.then(|| Candidate { impact, block: blocks.index(x, y) })
-}
-
-/// The candidates for the nearest obstacle among tracks.
-pub fn track_candidates(
+/// The nearest obstacle's points among tracks, by block.
+pub fn track_neighbourhoods(
     tracks: &[StereoTrack],
     motion: &MotionEstimate,
-    rig: &crate::geometry::StereoRig,
+    rig: &StereoRig,
     config: &Config,
     dt_s: f64,
-) -> Vec<Candidate> {
-    let Some(rigid) = RigidPrediction::new(&motion.theta, rig) else { return Vec::new() };
-    let blocks = Blocks::over(rig, 2.0 * config.block_px);
-    tracks
-        .iter()
-        .filter_map(|track| {
-            let xyd = &track.before.mean;
-            let measured = depth_velocity::dv_discrete(track, rig.depth_disparity_product());
-            let predicted = rigid.depth_velocity(xyd, track.before.sigma(2));
-            let velocity = rigid_unless_moving(Some(measured), predicted)?;
-            let impact = TimeToImpact { looming: velocity.looming(dt_s)? };
-            let before = rig.point(xyd)?;
-            let later = rigid.motion().apply(&before);
-            let crosses = config.window.is_crossed_by(&later, &((later - before) / dt_s), impact.seconds()?);
-            crosses.then(|| Candidate { impact, block: blocks.index(xyd.x, xyd.y) })
-        })
-        .collect()
+) -> Vec<Neighbourhood> {
+    // Tracks are about thirty pixels apart, so a block must be larger to hold several.
+    let blocks = Blocks::over(rig, 3.0 * config.block_px);
+    let mut seen = vec![Neighbourhood::default(); blocks.count()];
+    let Some(rigid) = RigidPrediction::new(&motion.theta, rig) else { return seen };
+    for track in tracks {
+        let xyd = &track.before.mean;
+        let measured = depth_velocity::dv_discrete(track, rig.depth_disparity_product());
+        let predicted = rigid.depth_velocity(xyd, track.before.sigma(2));
+        let Some(velocity) = rigid_unless_moving(Some(measured), predicted) else { continue };
+        let impact = velocity.looming(dt_s).map(|looming| TimeToImpact { looming });
+        let crossing = rig
+            .point(xyd)
+            .zip(impact)
+            .filter(|(before, impact)| crosses(&rigid, before, impact, config, dt_s));
+        seen[blocks.index(xyd.x, xyd.y)].add(crossing.map(|(_, impact)| impact));
+    }
+    seen
 }
 
-fn fill<'a>(width: usize, height: usize, rows: impl Iterator<Item = &'a Vec<Option<Pixel>>>) -> MotionMaps {
+fn fill(width: usize, height: usize, rows: &[Vec<Option<Pixel>>]) -> MotionMaps {
     let empty = || Field::missing(width, height);
     let mut maps = MotionMaps {
         depth_velocity: empty(),
@@ -157,7 +158,7 @@ fn fill<'a>(width: usize, height: usize, rows: impl Iterator<Item = &'a Vec<Opti
         impact_lo: empty(),
         impact_hi: Grid::filled(width, height, f32::NAN),
     };
-    for (v, row) in rows.enumerate() {
+    for (v, row) in rows.iter().enumerate() {
         for (u, pixel) in row.iter().enumerate() {
             let Some(pixel) = pixel else { continue };
             let vz = pixel.velocity.vz();

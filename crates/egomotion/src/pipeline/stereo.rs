@@ -5,10 +5,10 @@ use std::time::Instant;
 use thiserror::Error;
 
 use super::config::{Approach, Config, ConfigError, Method, Observe};
-use super::maps::{MotionMaps, motion_maps, track_candidates};
+use super::maps::{MotionMaps, motion_maps, track_neighbourhoods};
 use super::solve::{Observed, solve};
 use crate::estimate::maximum_likelihood::{maximum_likelihood, robust_start};
-use crate::estimate::{Blocks, MotionEstimate, Unsolvable};
+use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Field, Grid, Image, RigError, RigidMotion, StereoRig, Twist};
 use crate::motion::TimeToImpact;
 use crate::motion::impact::nearest;
@@ -388,7 +388,7 @@ impl FramePair<'_> {
             solve(&Observed::Sparse(tracks), self.rig, &rough?, self.config)
         });
         let impact = motion.as_ref().ok().and_then(|motion| {
-            nearest(&track_candidates(tracks, motion, self.rig, self.config, self.dt_s()))
+            nearest(&mut track_neighbourhoods(tracks, motion, self.rig, self.config, self.dt_s()))
         });
         PairResult { motion: motion.map_err(Unanswered::from), impact, flow: None, maps: None }
     }
@@ -430,11 +430,11 @@ impl FramePair<'_> {
         let motion = timed(&mut stages.estimate_ms, || {
             solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config)
         });
-        let (maps, candidates) =
+        let (maps, mut seen) =
             timed(&mut stages.maps_ms, || motion_maps(&pair, motion.as_ref().ok(), self.config, self.dt_s()));
         PairResult {
             motion: motion.map_err(Unanswered::from),
-            impact: nearest(&candidates),
+            impact: nearest(&mut seen),
             maps: Some(maps),
             flow: Some(flow),
         }
@@ -468,9 +468,4 @@ impl FramePair<'_> {
         }
         FlowField::prediction(flow.0, flow.1)
     }
-}
-
-/// Blocks of the configured size over a rig's image, as estimators use them.
-pub fn blocks(rig: &StereoRig, config: &Config) -> Blocks {
-    Blocks::over(rig, config.block_px)
 }

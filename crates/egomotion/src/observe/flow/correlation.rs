@@ -5,9 +5,9 @@
 //! σ² Σ g² × Σₗ ρ_r(l) ρ_g(l) over the lags l, with ρ the autocorrelations of residual and gradient.
 
 use super::Displacement;
-use super::sampling::cubic;
 use crate::geometry::Image;
 use crate::observe::pyramid::Gradients;
+use crate::observe::spline;
 use rayon::prelude::*;
 
 /// Every so many rows and columns are sampled.
@@ -59,7 +59,7 @@ fn sample(
     y: usize,
 ) -> Option<Sample> {
     let residual = |x: usize, y: usize| {
-        Some(cubic(to, x as f32 + flow.u.at(x, y), y as f32 + flow.v.at(x, y))? - from.at(x, y))
+        Some(spline::sample(to, x as f32 + flow.u.at(x, y), y as f32 + flow.v.at(x, y))? - from.at(x, y))
     };
     let product = |a: usize, b: usize| {
         slopes.du.at(x, y) * slopes.du.at(a, b) + slopes.dv.at(x, y) * slopes.dv.at(a, b)

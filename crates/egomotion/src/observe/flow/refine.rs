@@ -1,12 +1,12 @@
 //! Lucas–Kanade at full resolution: sub-pixel accuracy, and the covariance.
 
 use super::correlation::variance_factor;
-use super::sampling::cubic;
 use super::smooth::smooth;
 use super::window::{Rows, window_sums};
 use super::{Answer, Displacement, FlowOptions};
 use crate::geometry::{Grid, Image};
 use crate::observe::pyramid::{GRADIENT_NOISE_GAIN, Gradients, gradients};
+use crate::observe::spline;
 
 /// Share of the window that must have a counterpart in the second image.
 const MIN_COVERAGE: f32 = 0.6;
@@ -29,6 +29,7 @@ const SUMS: usize = 10;
 pub(super) fn refine(from: &Image, to: &Image, start: Displacement, options: &FlowOptions) -> Grid<Answer> {
     let (width, height) = from.size();
     let slopes = gradients(from);
+    let to = &spline::coefficients(to);
     let weights = options.window_weights();
     let area = options.correlation_area_px();
     let mut answers = Grid::filled(width, height, Answer::UNKNOWN);
@@ -72,7 +73,7 @@ fn products(
     let (grey, du, dv) = (from.row(y), slopes.du.row(y), slopes.dv.row(y));
     let (u, v) = (flow.u.row(y), flow.v.row(y));
     for x in 0..grey.len() {
-        let moved = cubic(to, x as f32 + u[x], y as f32 + v[x]);
+        let moved = spline::sample(to, x as f32 + u[x], y as f32 + v[x]);
         let known = if moved.is_some() { 1.0 } else { 0.0 };
         count[x] = known;
         gu[x] = known * du[x];

@@ -1,0 +1,89 @@
+//! Numbers as a person reads them.
+
+/// A value in a unit that suits it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    /// What to multiply metres or radians by.
+    pub factor: f64,
+    /// Its sign.
+    pub name: &'static str,
+}
+
+impl Unit {
+    /// A value that is in this unit already, with the unit's sign.
+    pub fn show(&self, value: f64, digits: i32) -> String {
+        // The degree sign follows its number without a space.
+        let space = if self.name == DEGREES.name { "" } else { "\u{a0}" };
+        format!("{}{space}{}", significant(value, digits), self.name)
+    }
+}
+
+/// Degrees, from radians.
+pub const DEGREES: Unit = Unit { factor: 180.0 / std::f64::consts::PI, name: "°" };
+
+/// Millimetres, metres or kilometres, whichever suits lengths up to `largest_m`.
+pub fn length(largest_m: f64) -> Unit {
+    match largest_m {
+        m if m < 0.5 => Unit { factor: 1e3, name: "mm" },
+        m if m < 5e3 || !m.is_finite() => Unit { factor: 1.0, name: "m" },
+        _ => Unit { factor: 1e-3, name: "km" },
+    }
+}
+
+/// `value` to `digits` significant digits, with a true minus sign; a dash if it is not finite.
+pub fn significant(value: f64, digits: i32) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
+    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    if !(-5..9).contains(&magnitude) {
+        return format!("{value:.*e}", (digits - 1).max(0) as usize).replace('-', "−");
+    }
+    fixed(value, (digits - 1 - magnitude).max(0) as usize)
+}
+
+/// `value` with that many decimals and a true minus sign; a dash if it is not finite.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return "–".into();
+    }
+    let text = format!("{value:.decimals$}");
+    // A rounded −0 has no sign to show.
+    match text.strip_prefix('-') {
+        Some(rest) if rest.bytes().any(|b| (b'1'..=b'9').contains(&b)) => format!("−{rest}"),
+        Some(rest) => rest.to_owned(),
+        None => text,
+    }
+}
+
+/// `value ± sigma`, both with the decimals that show two digits of σ, at most six.
+pub fn with_sigma(value: f64, sigma: f64) -> String {
+    if !(sigma.is_finite() && sigma > 0.0) {
+        return significant(value, 4);
+    }
+    let decimals = (1 - sigma.log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{} ± {}", fixed(value, decimals), fixed(sigma, decimals))
+}
+
+/// A number of things with its noun.
+pub fn count(n: usize, one: &str, many: &str) -> String {
+    format!("{n} {}", if n == 1 { one } else { many })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!(significant(0.012345, 2), "0.012");
+        assert_eq!(significant(-1234.5, 3), "−1234");
+        assert_eq!(significant(f64::NAN, 3), "–");
+        assert_eq!(significant(3.2e-9, 2), "3.2e−9");
+        assert_eq!(fixed(-0.0004, 2), "0.00");
+        assert_eq!(with_sigma(-47.1234, 0.0213), "−47.123 ± 0.021");
+        assert_eq!(with_sigma(1.5, f64::INFINITY), "1.500");
+        assert_eq!(DEGREES.show(1.5, 2), "1.5°");
+        assert_eq!(length(0.02).show(20.0, 2), "20\u{a0}mm");
+    }
+}

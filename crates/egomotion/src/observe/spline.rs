@@ -1,0 +1,170 @@
+//! Cubic B-splines: an image read between its pixels almost without loss of contrast.
+//!
+//! A four-tap kernel on the grey levels themselves attenuates fine texture half-way between pixels
+//! by a tenth and more, which biases every sub-pixel match. The same four taps on the spline's
+//! *coefficients* pass through the grey levels and lose a quarter of that (Unser, Aldroubi and
+//! Eden 1993).
+
+use rayon::prelude::*;
+
+use crate::geometry::{Grid, Image};
+
+/// The pole of the cubic B-spline's inverse filter, √3 − 2.
+const POLE: f32 = -0.267_949_2;
+/// Rows are filtered along columns in strips of so many columns.
+const STRIP: usize = 64;
+/// After so many pixels the influence of one is below single precision.
+const REACH: usize = 12;
+
+/// Weights of the four coefficients around the fraction `t` (0 … 1) of a pixel.
+pub fn weights(t: f32) -> [f32; 4] {
+    let (s, t2) = (1.0 - t, t * t);
+    let (a, d) = (s * s * s / 6.0, t2 * t / 6.0);
+    [a, 2.0 / 3.0 - t2 + 0.5 * t2 * t, 2.0 / 3.0 - s * s + 0.5 * s * s * s, d]
+}
+
+/// Coefficients along rows only, for reading between the pixels of a row.
+pub fn row_coefficients(image: &Image) -> Image {
+    let mut out = image.clone();
+    let width = image.width().max(1);
+    out.values_mut().par_chunks_mut(width).for_each(filter);
+    out
+}
+
+/// Coefficients in both directions, mirrored at the borders.
+pub fn coefficients(image: &Image) -> Image {
+    let mut out = row_coefficients(image);
+    let (width, height) = out.size();
+    let strips: Vec<Vec<f32>> = (0..width.div_ceil(STRIP))
+        .into_par_iter()
+        .map(|strip| {
+            let first = strip * STRIP;
+            let count = STRIP.min(width - first);
+            let mut rows: Vec<f32> =
+                (0..height).flat_map(|v| out.row(v)[first..first + count].iter().copied()).collect();
+            filter_rows(&mut rows, count);
+            rows
+        })
+        .collect();
+    for (strip, rows) in strips.iter().enumerate() {
+        let (first, count) = (strip * STRIP, STRIP.min(width - strip * STRIP));
+        for (v, row) in rows.chunks_exact(count).enumerate() {
+            out.row_mut(v)[first..first + count].copy_from_slice(row);
+        }
+    }
+    out
+}
+
+/// The inverse filter along one line.
+fn filter(line: &mut [f32]) {
+    filter_rows(line, 1);
+}
+
+/// The inverse filter down the columns of rows of `width` values.
+fn filter_rows(values: &mut [f32], width: usize) {
+    let height = values.len() / width.max(1);
+    if height < 2 {
+        return;
+    }
+    // Causal start: the mirrored signal's sum, cut where it no longer counts.
+    let mut start = values[..width].to_vec();
+    let mut power = POLE;
+    for v in 1..height.min(REACH) {
+        for (s, &x) in start.iter_mut().zip(&values[v * width..]) {
+            *s += power * x;
+        }
+        power *= POLE;
+    }
+    values[..width].copy_from_slice(&start);
+    for v in 1..height {
+        let (before, here) = values.split_at_mut(v * width);
+        for (x, &b) in here[..width].iter_mut().zip(&before[(v - 1) * width..]) {
+            *x += POLE * b;
+        }
+    }
+    // Anticausal start for a mirrored signal.
+    let last = (height - 1) * width;
+    let end = POLE / (POLE * POLE - 1.0);
+    for i in 0..width {
+        values[last + i] = end * (values[last + i] + POLE * values[last - width + i]);
+    }
+    for v in (0..height - 1).rev() {
+        let (here, after) = values.split_at_mut((v + 1) * width);
+        for (x, &a) in here[v * width..].iter_mut().zip(&after[..width]) {
+            *x = POLE * (a - *x);
+        }
+    }
+    values.iter_mut().for_each(|x| *x *= 6.0);
+}
+
+/// Value at (u, v) in pixels from coefficients in both directions, mirrored at the border; `None` outside.
+#[inline]
+pub fn sample(coefficients: &Grid<f32>, u: f32, v: f32) -> Option<f32> {
+    let (width, height) = coefficients.size();
+    if !(u >= 0.0 && v >= 0.0 && u <= width as f32 - 1.0 && v <= height as f32 - 1.0) {
+        return None;
+    }
+    let (u0, v0) = (u as usize, v as usize);
+    let (wu, wv) = (weights(u - u0 as f32), weights(v - v0 as f32));
+    let mut sum = 0.0;
+    if u0 >= 1 && v0 >= 1 && u0 + 3 <= width && v0 + 3 <= height {
+        for (k, w) in wv.into_iter().enumerate() {
+            let four = coefficients.row(v0 + k - 1).get(u0 - 1..)?.first_chunk::<4>()?;
+            sum += w * (four[0] * wu[0] + four[1] * wu[1] + four[2] * wu[2] + four[3] * wu[3]);
+        }
+        return Some(sum);
+    }
+    for (k, w) in wv.into_iter().enumerate() {
+        let row = coefficients.row(mirrored(v0 + k, height));
+        for (l, x) in wu.into_iter().enumerate() {
+            sum += w * x * row[mirrored(u0 + l, width)];
+        }
+    }
+    Some(sum)
+}
+
+/// Index `shifted − 1` of a line of `n`, mirrored about its first and last pixel.
+fn mirrored(shifted: usize, n: usize) -> usize {
+    let index = if shifted == 0 { 1 } else { shifted - 1 };
+    (if index >= n { (2 * n).saturating_sub(2 + index) } else { index }).min(n - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spline_passes_through_the_pixels() {
+        let image = Grid::from_fn(33, 21, |u, v| ((u * 37 + v * 91) % 50) as f32);
+        let c = coefficients(&image);
+        for (u, v) in [(0, 0), (32, 20), (1, 19), (16, 10), (31, 3)] {
+            let value = sample(&c, u as f32, v as f32).unwrap();
+            assert!((value - image.at(u, v)).abs() < 1e-3, "{u} {v}: {value} {}", image.at(u, v));
+        }
+        assert_eq!(sample(&c, 32.01, 3.0), None);
+        assert_eq!(sample(&c, f32::NAN, 3.0), None);
+    }
+
+    #[test]
+    fn fine_texture_keeps_its_contrast_between_pixels() {
+        // Four pixels a period: Keys' cubic leaves .884 of the contrast, the spline .972.
+        let wave = |u: f64| (u * std::f64::consts::FRAC_PI_2).cos();
+        let image = Grid::from_fn(64, 8, |u, _| wave(u as f64) as f32);
+        let c = coefficients(&image);
+        for u in [20.5, 21.5, 30.25] {
+            let error = f64::from(sample(&c, u as f32, 4.0).unwrap()) - wave(u);
+            assert!(error.abs() < 0.025, "{u}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_smallest_images_are_no_trouble() {
+        for (width, height) in [(0, 0), (1, 1), (2, 1), (1, 5), (3, 2)] {
+            let c = coefficients(&Grid::filled(width, height, 7.0));
+            if width > 0 {
+                let centre = sample(&c, (width - 1) as f32 / 2.0, (height - 1) as f32 / 2.0).unwrap();
+                assert!(centre.is_finite());
+            }
+        }
+    }
+}
