@@ -31,3 +31,8 @@ pub mod write;
 
 pub use error::IoError;
 pub use source::Source;
+
+/// The examples of the README, compiled with the doc tests; here because they need both libraries.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;
