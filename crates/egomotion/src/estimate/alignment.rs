@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::lmeds::{LmedsOptions, robust_scale, trials};
-use super::m_estimator::StudentT;
+use super::m_estimator::{LEAST_SCALE2, StudentT};
 use super::{Estimate, MotionEstimate, Unsolvable, blocks, median};
 use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
 use crate::observe::StereoTrack;
@@ -261,10 +261,10 @@ fn student_weights(
             .ok_or(Unsolvable::Unobservable)?;
         squares.clear();
         squares.extend(pairs.iter().map(|pair| alignment.square(pair) / pair.variance));
-        let s2 = scale2.unwrap_or_else(|| median(&mut squares.clone()) / 2.366).max(f64::MIN_POSITIVE);
+        let s2 = scale2.unwrap_or_else(|| median(&mut squares.clone()) / 2.366).max(LEAST_SCALE2);
         let robust: Vec<f64> = squares.iter().map(|q| kernel.weight(q / s2, 3.0)).collect();
         let sum: f64 = robust.iter().zip(&squares).map(|(w, q)| w * q).sum();
-        scale2 = Some((sum / (3 * pairs.len()) as f64).max(f64::MIN_POSITIVE));
+        scale2 = Some((sum / (3 * pairs.len()) as f64).max(LEAST_SCALE2));
         let next: Vec<f64> = robust.iter().zip(pairs).map(|(w, pair)| w / pair.variance).collect();
         let settled = next.iter().zip(&weights).all(|(a, b)| (a - b).abs() <= kernel.tolerance * a.max(*b));
         weights = next;
