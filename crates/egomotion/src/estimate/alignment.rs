@@ -114,12 +114,14 @@ impl Moments {
         let (p, q) = (self.before / self.weight, self.after / self.weight);
         let spread = self.spread / self.weight - p * p.transpose();
         let cross = self.cross / self.weight - q * p.transpose();
-        // Collinear points leave a rotation undetermined, coplanar ones a matrix.
+        // Collinear points leave a rotation undetermined, coplanar ones a matrix; equal ones leave rounding
+        // errors of the squared distance from the camera.
+        let rounding = 1e-12 * self.spread.trace() / self.weight;
         let eigen = spread.symmetric_eigenvalues();
         let (smallest, largest) = (eigen.min(), eigen.max());
         let middle = eigen.sum() - smallest - largest;
         let needed = if form == Form::Affine { smallest } else { middle };
-        if !(largest > 0.0 && needed > 1e-12 * largest) {
+        if !(needed > rounding.max(1e-12 * largest)) {
             return None;
         }
         let linear = match form {
@@ -171,7 +173,7 @@ pub fn align(pairs: &[PointPair], form: Form, fitting: &Fitting) -> Result<Motio
     };
     let cut = 0.1 * weights.iter().copied().fold(0.0, f64::max);
     Ok(Estimate {
-        theta: Gaussian { mean, cov: leave_one_out(pairs, &weights, form, &whole, &mean) },
+        theta: Gaussian { mean, cov: leave_one_out(pairs, &weights, form, &whole) },
         observed: [true; 6],
         rows: pairs.len(),
         inliers: match fitting {
@@ -189,22 +191,22 @@ fn leave_one_out(
     weights: &[f64],
     form: Form,
     whole: &Moments,
-    mean: &Vector6<f64>,
 ) -> nalgebra::Matrix6<f64> {
     let count = pairs.iter().map(|pair| pair.block + 1).max().unwrap_or(0);
     let mut members: Vec<Vec<(&PointPair, f64)>> = vec![Vec::new(); count];
     for (pair, &weight) in pairs.iter().zip(weights) {
         members[pair.block].push((pair, weight));
     }
-    let left_out: Vec<Vector6<f64>> = members
+    let left_out: Option<Vec<Vector6<f64>>> = members
         .into_iter()
         .filter(|block| !block.is_empty())
         .map(|block| {
             let rest = whole.without(&Moments::over(block)).align(form);
-            rest.and_then(|a| a.motion()).map_or(*mean, |m| m.log().vector())
+            Some(rest?.motion()?.log().vector())
         })
         .collect();
-    blocks::jackknife(&left_out)
+    // A block without which nothing is determined may be off by anything.
+    blocks::jackknife(&left_out.unwrap_or_default())
 }
 
 fn lmeds_weights(

@@ -17,7 +17,9 @@ fn part(v: &Vector6<f64>, places: [usize; 3]) -> Vector3<f64> {
 
 /// φ in two steps: `solve` finds (tZ, ΩX, ΩY) from the rows `dv`, then (tX, tY, ΩZ) from the rows `flow`.
 ///
-/// The error of the first step is carried into the covariance of the second.
+/// The error of the first step is carried into the covariance of the second. Where the first does not find all
+/// its three (a level ground does not tell tZ from ΩX), the second subtracts an arbitrary motion, so that none of
+/// its own are observed either.
 ///
 /// # Errors
 /// Those of `solve`.
@@ -44,11 +46,18 @@ pub fn two_step(
     system.add(&first_rows, &first, FIRST);
     system.add(&second_rows, &second, SECOND);
     system.couple(flow, &second);
-    let (cov, observed) = system.covariance()?;
+    let (mut cov, mut observed) = system.covariance()?;
     let mut mean = Vector6::zeros();
     for i in 0..3 {
         mean[FIRST[i]] = first.theta[i];
         mean[SECOND[i]] = second.theta[i];
+    }
+    if first.observability.rank() < 3 {
+        SECOND.into_iter().for_each(|i| observed[i] = false);
+        cov = blocks::with_unknowns(cov, &observed);
+    }
+    for i in (0..6).filter(|&i| !observed[i]) {
+        mean[i] = 0.0;
     }
     Ok(Estimate {
         theta: Gaussian { mean, cov },
