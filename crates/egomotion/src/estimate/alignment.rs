@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::lmeds::{LmedsOptions, robust_scale, trials};
-use super::m_estimator::StudentT;
+use super::m_estimator::{LEAST_SCALE2, StudentT};
 use super::{Estimate, MotionEstimate, Unsolvable, blocks, median};
 use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
 use crate::observe::StereoTrack;
@@ -56,8 +56,20 @@ pub struct Alignment {
 }
 
 impl Alignment {
+    fn residual(&self, pair: &PointPair) -> Vector3<f64> {
+        pair.after - self.linear * pair.before - self.translation
+    }
+
     fn square(&self, pair: &PointPair) -> f64 {
-        (pair.after - self.linear * pair.before - self.translation).norm_squared()
+        self.residual(pair).norm_squared()
+    }
+
+    /// The way to another alignment, stretched.
+    fn away_to(&self, other: &Self, stretch: &Matrix3<f64>) -> Self {
+        Self {
+            linear: self.linear + stretch * (other.linear - self.linear),
+            translation: self.translation + stretch * (other.translation - self.translation),
+        }
     }
 
     /// The rigid motion with the rotation nearest to M.
@@ -114,12 +126,14 @@ impl Moments {
         let (p, q) = (self.before / self.weight, self.after / self.weight);
         let spread = self.spread / self.weight - p * p.transpose();
         let cross = self.cross / self.weight - q * p.transpose();
-        // Collinear points leave a rotation undetermined, coplanar ones a matrix.
+        // Collinear points leave a rotation undetermined, coplanar ones a matrix; equal ones leave rounding
+        // errors of the squared distance from the camera.
+        let rounding = 1e-12 * self.spread.trace() / self.weight;
         let eigen = spread.symmetric_eigenvalues();
         let (smallest, largest) = (eigen.min(), eigen.max());
         let middle = eigen.sum() - smallest - largest;
         let needed = if form == Form::Affine { smallest } else { middle };
-        if !(largest > 0.0 && needed > 1e-12 * largest) {
+        if !(needed > rounding.max(1e-12 * largest)) {
             return None;
         }
         let linear = match form {
@@ -150,15 +164,15 @@ pub fn align(pairs: &[PointPair], form: Form, fitting: &Fitting) -> Result<Motio
     if pairs.len() < subset {
         return Err(Unsolvable::FewRows { rows: pairs.len(), needed: subset });
     }
-    let (weights, scale) = match fitting {
-        Fitting::LeastSquares => (vec![1.0; pairs.len()], None),
+    let (weights, scale, stretch) = match fitting {
+        Fitting::LeastSquares => (vec![1.0; pairs.len()], None, Matrix3::identity()),
         Fitting::Lmeds(options) => {
             let (weights, scale) = lmeds_weights(pairs, form, subset, options)?;
-            (weights, Some(scale))
+            (weights, Some(scale), Matrix3::identity())
         }
         Fitting::MEstimator(kernel) => {
-            let (weights, scale) = student_weights(pairs, form, kernel)?;
-            (weights, Some(scale))
+            let (weights, scale, slope) = student_weights(pairs, form, kernel)?;
+            (weights, Some(scale), stretch(form, &slope))
         }
     };
     let whole = Moments::over(pairs.iter().zip(weights.iter().copied()));
@@ -171,7 +185,7 @@ pub fn align(pairs: &[PointPair], form: Form, fitting: &Fitting) -> Result<Motio
     };
     let cut = 0.1 * weights.iter().copied().fold(0.0, f64::max);
     Ok(Estimate {
-        theta: Gaussian { mean, cov: leave_one_out(pairs, &weights, form, &whole, &mean) },
+        theta: Gaussian { mean, cov: leave_one_out(pairs, &weights, form, &whole, &stretch) },
         observed: [true; 6],
         rows: pairs.len(),
         inliers: match fitting {
@@ -189,22 +203,24 @@ fn leave_one_out(
     weights: &[f64],
     form: Form,
     whole: &Moments,
-    mean: &Vector6<f64>,
+    stretch: &Matrix3<f64>,
 ) -> nalgebra::Matrix6<f64> {
     let count = pairs.iter().map(|pair| pair.block + 1).max().unwrap_or(0);
     let mut members: Vec<Vec<(&PointPair, f64)>> = vec![Vec::new(); count];
     for (pair, &weight) in pairs.iter().zip(weights) {
         members[pair.block].push((pair, weight));
     }
-    let left_out: Vec<Vector6<f64>> = members
+    let Some(all) = whole.align(form) else { return blocks::jackknife(&[]) };
+    let left_out: Option<Vec<Vector6<f64>>> = members
         .into_iter()
         .filter(|block| !block.is_empty())
         .map(|block| {
             let rest = whole.without(&Moments::over(block)).align(form);
-            rest.and_then(|a| a.motion()).map_or(*mean, |m| m.log().vector())
+            Some(all.away_to(&rest?, stretch).motion()?.log().vector())
         })
         .collect();
-    blocks::jackknife(&left_out)
+    // A block without which nothing is determined may be off by anything.
+    blocks::jackknife(&left_out.unwrap_or_default())
 }
 
 fn lmeds_weights(
@@ -246,11 +262,25 @@ fn lmeds_weights(
     Ok((weights, scale))
 }
 
+/// How much further an estimate moves when a block is left out than it does while the weights are held.
+///
+/// `slope` is the mean derivative of the robust score by the residual as a share of the mean weight. A matrix
+/// has three regressions of its own, one for each axis; a rotation ties them together.
+fn stretch(form: Form, slope: &Matrix3<f64>) -> Matrix3<f64> {
+    let mean = Matrix3::identity() * (3.0 / slope.trace());
+    match form {
+        Form::Affine => slope.try_inverse().unwrap_or(mean),
+        Form::Rigid => mean,
+    }
+}
+
+/// Weights, scale, and the slope that [`stretch`] needs.
 fn student_weights(
     pairs: &[PointPair],
     form: Form,
     kernel: &StudentT,
-) -> Result<(Vec<f64>, f64), Unsolvable> {
+) -> Result<(Vec<f64>, f64, Matrix3<f64>), Unsolvable> {
+    let mut slope = Matrix3::identity();
     let mut weights: Vec<f64> = pairs.iter().map(|pair| pair.variance.recip()).collect();
     let mut squares: Vec<f64> = Vec::with_capacity(pairs.len());
     // A robust first scale; 2.366 is the median of χ²₃.
@@ -261,10 +291,11 @@ fn student_weights(
             .ok_or(Unsolvable::Unobservable)?;
         squares.clear();
         squares.extend(pairs.iter().map(|pair| alignment.square(pair) / pair.variance));
-        let s2 = scale2.unwrap_or_else(|| median(&mut squares.clone()) / 2.366).max(f64::MIN_POSITIVE);
+        let s2 = scale2.unwrap_or_else(|| median(&mut squares.clone()) / 2.366).max(LEAST_SCALE2);
         let robust: Vec<f64> = squares.iter().map(|q| kernel.weight(q / s2, 3.0)).collect();
         let sum: f64 = robust.iter().zip(&squares).map(|(w, q)| w * q).sum();
-        scale2 = Some((sum / (3 * pairs.len()) as f64).max(f64::MIN_POSITIVE));
+        slope = mean_slope(pairs, &alignment, &robust, |q| kernel.curvature(q / s2, 3.0) / s2);
+        scale2 = Some((sum / (3 * pairs.len()) as f64).max(LEAST_SCALE2));
         let next: Vec<f64> = robust.iter().zip(pairs).map(|(w, pair)| w / pair.variance).collect();
         let settled = next.iter().zip(&weights).all(|(a, b)| (a - b).abs() <= kernel.tolerance * a.max(*b));
         weights = next;
@@ -272,5 +303,22 @@ fn student_weights(
             break;
         }
     }
-    Ok((weights, scale2.unwrap_or(1.0).sqrt()))
+    Ok((weights, scale2.unwrap_or(1.0).sqrt(), slope))
+}
+
+/// Σ (w I − κ r rᵀ)/Σ w over pairs, r in units of each pair's σ and κ the curvature at r².
+fn mean_slope(
+    pairs: &[PointPair],
+    alignment: &Alignment,
+    weights: &[f64],
+    curvature: impl Fn(f64) -> f64,
+) -> Matrix3<f64> {
+    let (mut bend, mut total) = (Matrix3::zeros(), 0.0);
+    for (pair, w) in pairs.iter().zip(weights) {
+        let r = alignment.residual(pair);
+        bend += (curvature(r.norm_squared() / pair.variance) * r * r.transpose())
+            / (pair.variance * pair.variance);
+        total += w / pair.variance;
+    }
+    Matrix3::identity() - bend / total
 }

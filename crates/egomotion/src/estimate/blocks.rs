@@ -44,6 +44,9 @@ impl Blocks {
     }
 }
 
+/// Fewest blocks whose scatter says anything: the score of a single one is zero at the estimate.
+const LEAST_BLOCKS: usize = 2;
+
 /// What one block says at the estimate: its information Σ w a aᵀ and its score Σ w a r.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockScore<const N: usize> {
@@ -62,7 +65,8 @@ impl<const N: usize> Default for BlockScore<N> {
 /// Covariance of an estimate from the scores of its blocks.
 ///
 /// `bread_inverse` is the inverse derivative of the total score; where it is `None` it is taken
-/// from the total information. Undetermined directions get an infinite variance.
+/// from the total information. Undetermined directions get an infinite variance; with a single block
+/// all do.
 pub fn covariance<const N: usize>(
     scores: &[BlockScore<N>],
     bread_inverse: Option<&SMatrix<f64, N, N>>,
@@ -78,8 +82,11 @@ pub fn covariance<const N: usize>(
             inverse_root_of_rest(&(w.transpose() * information * &w)) * score
         })
         .collect();
+    if influences.len() < LEAST_BLOCKS {
+        return with_unknowns(SMatrix::zeros(), &[false; N]);
+    }
     let whitened = shrunk_second_moment(&influences, w.ncols());
-    let spread = match bread_inverse {
+    let spread = match bread_inverse.filter(|_| w.ncols() == N) {
         // B⁻¹ A^{1/2} instead of A^{−1/2}: the whitening's pseudo-inverse is A W.
         Some(inverse) => {
             let total: SMatrix<f64, N, N> = scores.iter().map(|b| b.information).sum();
@@ -100,14 +107,23 @@ pub fn model_covariance<const N: usize>(scale2: f64, observability: &Observabili
 }
 
 /// Covariance from leave-one-block-out estimates (the jackknife), for estimators without a score.
+///
+/// Infinite with a single block.
 pub fn jackknife<const N: usize>(left_out: &[SVector<f64, N>]) -> SMatrix<f64, N, N> {
+    if left_out.len() < LEAST_BLOCKS {
+        return with_unknowns(SMatrix::zeros(), &[false; N]);
+    }
     let count = left_out.len() as f64;
     let mean = left_out.iter().sum::<SVector<f64, N>>() / count;
     left_out.iter().map(|theta| (theta - mean) * (theta - mean).transpose()).sum::<SMatrix<f64, N, N>>()
         * ((count - 1.0) / count)
 }
 
-fn with_unknowns<const N: usize>(mut cov: SMatrix<f64, N, N>, observed: &[bool; N]) -> SMatrix<f64, N, N> {
+/// The covariance with an infinite variance for what is not observed.
+pub(super) fn with_unknowns<const N: usize>(
+    mut cov: SMatrix<f64, N, N>,
+    observed: &[bool; N],
+) -> SMatrix<f64, N, N> {
     for i in (0..N).filter(|&i| !observed[i]) {
         cov.row_mut(i).fill(0.0);
         cov.column_mut(i).fill(0.0);

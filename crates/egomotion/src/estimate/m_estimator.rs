@@ -39,6 +39,10 @@ impl StudentT {
     }
 }
 
+/// Least squared scale of residuals in units of σ: what exact observations leave below it are rounding errors,
+/// which have no scale that an iteration could settle at.
+pub(super) const LEAST_SCALE2: f64 = 1e-12;
+
 /// Squared residual, in units of the scaled σ, beyond which a row is no inlier: χ²₁(0.99).
 const INLIER_Q: f64 = 6.635;
 
@@ -56,7 +60,7 @@ pub fn m_estimate<const N: usize>(
     let standard = |row: &Row<N>, theta: &SVector<f64, N>| row.residual(theta) / row.sigma;
     let mut theta = *start;
     let mut absolute: Vec<f64> = rows.iter().map(|row| standard(row, &theta).abs()).collect();
-    let mut scale2 = (1.4826 * median(&mut absolute)).powi(2).max(f64::MIN_POSITIVE);
+    let mut scale2 = (1.4826 * median(&mut absolute)).powi(2).max(LEAST_SCALE2);
     let mut weights = vec![0.0; rows.len()];
     for _ in 0..kernel.iterations {
         let mut sum = 0.0;
@@ -66,7 +70,7 @@ pub fn m_estimate<const N: usize>(
             sum += w * r2;
             *weight = w / (row.sigma * row.sigma);
         }
-        scale2 = (sum / rows.len().saturating_sub(N).max(1) as f64).max(f64::MIN_POSITIVE);
+        scale2 = (sum / rows.len().saturating_sub(N).max(1) as f64).max(LEAST_SCALE2);
         let equations = NormalEquations::over(rows.iter().zip(weights.iter().copied()));
         let (next, observability) = equations.solve()?;
         let moved = (next - theta).component_mul(&equations.information.diagonal().map(f64::sqrt)).amax();

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::alignment::{Form, Moments, PointPair};
 use super::blocks::{self, BlockScore, Blocks};
 use super::lmeds::{random_subsets, trials};
-use super::m_estimator::StudentT;
+use super::m_estimator::{LEAST_SCALE2, StudentT};
 use super::{Estimate, MotionEstimate, Observability, Unsolvable, median};
 use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
 use crate::observe::{StereoFlow, StereoTrack};
@@ -244,7 +244,7 @@ pub fn maximum_likelihood<M: Measurement>(
         let delta = observability.solve(&step.score.information, &step.score.score)?;
         phi = Twist::from_vector(&(phi.vector() + delta));
         if !kernel.nu.is_infinite() {
-            scale2 = (step.weighted_square / (3 * step.used) as f64).max(f64::MIN_POSITIVE);
+            scale2 = (step.weighted_square / (3 * step.used) as f64).max(LEAST_SCALE2);
         }
         let moved = delta.dot(&(step.score.information * delta)).max(0.0).sqrt();
         if moved <= kernel.tolerance * scale2.sqrt() {
@@ -281,7 +281,7 @@ fn sums<M: Measurement>(
 fn robust_scale2<M: Measurement>(observations: &[M], phi: &Twist, rig: &StereoRig) -> Option<f64> {
     let at = At::new(*phi, rig);
     let mut squares: Vec<f64> = observations.iter().filter_map(|o| sampson(o, &at)).collect();
-    (!squares.is_empty()).then(|| (median(&mut squares) / 2.366).max(f64::MIN_POSITIVE))
+    (!squares.is_empty()).then(|| (median(&mut squares) / 2.366).max(LEAST_SCALE2))
 }
 
 /// q with the structure held at its measured value (the Sampson form).
@@ -317,7 +317,7 @@ fn finish<M: Measurement>(
     let freedom = (3 * whole.used).saturating_sub(6).max(1) as f64;
     Ok(MaximumLikelihood {
         motion: Estimate {
-            theta: Gaussian { mean: at.phi.vector(), cov },
+            theta: Gaussian { mean: observability.known(&at.phi.vector()), cov },
             observed: observability.observed(),
             rows: observations.len(),
             inliers: whole.inliers,

@@ -124,7 +124,7 @@ impl<const N: usize> Fit<N> {
         let inverse = self.bread.and_then(|bread| bread.try_inverse());
         let cov = blocks::covariance(&scores, inverse.as_ref(), &self.observability);
         Estimate {
-            theta: Gaussian { mean: self.theta, cov },
+            theta: Gaussian { mean: self.observability.known(&self.theta), cov },
             observed: self.observability.observed(),
             rows: rows.len(),
             inliers: self.inliers,

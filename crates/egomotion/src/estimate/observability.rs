@@ -10,6 +10,10 @@ use super::Unsolvable;
 /// sums of 10⁵ rows are good to about 10⁻¹².
 const RANK_TOLERANCE: f64 = 1e-10;
 
+/// Unknowns with less than this share of the largest diagonal entry are ones no row speaks of: scaled up to a
+/// unit diagonal, the rounding errors there would pass for information. Metres and radians lie nearer together.
+const NEGLIGIBLE: f64 = 1e-24;
+
 /// Components with more of themselves than this (squared) in an undetermined direction are unobservable.
 const NULL_SHARE: f64 = 1e-6;
 
@@ -34,10 +38,11 @@ impl Observability {
             return Err(Unsolvable::NotFinite);
         }
         let diagonal = information.diagonal();
+        let negligible = NEGLIGIBLE * diagonal.max();
         if diagonal.max() <= 0.0 {
             return Err(Unsolvable::Unobservable);
         }
-        let inverse_root = |v: f64| if v > 0.0 { v.sqrt().recip() } else { 0.0 };
+        let inverse_root = |v: f64| if v > negligible { v.sqrt().recip() } else { 0.0 };
         let scale = DVector::from_iterator(N, diagonal.iter().map(|&v| inverse_root(v)));
         let scaled = DMatrix::from_fn(N, N, |i, j| information[(i, j)] * scale[i] * scale[j]);
         let eigen = scaled.symmetric_eigen();
@@ -66,6 +71,12 @@ impl Observability {
             let share: f64 = kept.iter().map(|&k| self.eigenvectors[(i, k)].powi(2)).sum();
             self.scale[i] > 0.0 && 1.0 - share < NULL_SHARE
         })
+    }
+
+    /// θ as far as it is determined: the unobserved components at zero.
+    pub fn known<const N: usize>(&self, theta: &SVector<f64, N>) -> SVector<f64, N> {
+        let observed: [bool; N] = self.observed();
+        SVector::from_fn(|i, _| if observed[i] { theta[i] } else { 0.0 })
     }
 
     /// The whitening matrix W, N × rank: W Wᵀ is the (pseudo-)inverse of the information.

@@ -17,7 +17,9 @@ fn part(v: &Vector6<f64>, places: [usize; 3]) -> Vector3<f64> {
 
 /// φ in two steps: `solve` finds (tZ, ΩX, ΩY) from the rows `dv`, then (tX, tY, ΩZ) from the rows `flow`.
 ///
-/// The error of the first step is carried into the covariance of the second.
+/// The error of the first step is carried into the covariance of the second. Where the first does not find all
+/// its three (a level ground does not tell tZ from ΩX), the second subtracts an arbitrary motion, so that none of
+/// its own are observed either.
 ///
 /// # Errors
 /// Those of `solve`.
@@ -44,11 +46,18 @@ pub fn two_step(
     system.add(&first_rows, &first, FIRST);
     system.add(&second_rows, &second, SECOND);
     system.couple(flow, &second);
-    let (cov, observed) = system.covariance()?;
+    let (mut cov, mut observed) = system.covariance()?;
     let mut mean = Vector6::zeros();
     for i in 0..3 {
         mean[FIRST[i]] = first.theta[i];
         mean[SECOND[i]] = second.theta[i];
+    }
+    if first.observability.rank() < 3 {
+        SECOND.into_iter().for_each(|i| observed[i] = false);
+        cov = blocks::with_unknowns(cov, &observed);
+    }
+    for i in (0..6).filter(|&i| !observed[i]) {
+        mean[i] = 0.0;
     }
     Ok(Estimate {
         theta: Gaussian { mean, cov },
@@ -57,6 +66,15 @@ pub fn two_step(
         inliers: first.inliers + second.inliers,
         residual_scale: second.residual_scale,
     })
+}
+
+/// Factor that brings a step's score to units of its residuals' σ.
+///
+/// The first step's rows may be in 1/m and the second's in pixels: without it neither scatter could be
+/// compared with the other, as shrinkage does.
+fn unit_of_score(fit: &Fit<3>) -> f64 {
+    let unit = fit.residual_scale.powi(-2);
+    if unit.is_finite() && unit > 0.0 { unit } else { 1.0 }
 }
 
 /// Both steps as one system of estimating equations, whose derivative is block triangular.
@@ -72,7 +90,9 @@ impl StackedSystem {
 
     fn add(&mut self, rows: &[Row<3>], fit: &Fit<3>, places: [usize; 3]) {
         let mut information = Matrix3::zeros();
+        let unit = unit_of_score(fit);
         for (row, &weight) in rows.iter().zip(&fit.weights) {
+            let weight = weight * unit;
             let (outer, score) =
                 (weight * row.a * row.a.transpose(), weight * row.residual(&fit.theta) * row.a);
             information += outer;
@@ -84,7 +104,7 @@ impl StackedSystem {
                 }
             }
         }
-        let bread = fit.bread.unwrap_or(information);
+        let bread = fit.bread.map_or(information, |bread| bread * unit);
         for i in 0..3 {
             for j in 0..3 {
                 self.bread[(places[i], places[j])] += bread[(i, j)];
@@ -94,11 +114,19 @@ impl StackedSystem {
 
     /// How the second step's score changes with the first step's answer.
     fn couple(&mut self, flow: &[Row<6>], second: &Fit<3>) {
-        let coupling: Matrix3<f64> = flow
-            .iter()
-            .zip(&second.weights)
-            .map(|(row, &weight)| weight * part(&row.a, SECOND) * part(&row.a, FIRST).transpose())
-            .sum();
+        let unit = unit_of_score(second);
+        let (mut coupling, mut information) = (Matrix3::zeros(), Matrix3::zeros());
+        for (row, &weight) in flow.iter().zip(&second.weights) {
+            let a = part(&row.a, SECOND);
+            coupling += weight * unit * a * part(&row.a, FIRST).transpose();
+            information += weight * a * a.transpose();
+        }
+        // Robust weights give way, to the first step's error as to the second's unknowns: bread over information.
+        if let Some(ratio) =
+            second.bread.zip(information.try_inverse()).map(|(bread, inverse)| bread * inverse)
+        {
+            coupling = ratio * coupling;
+        }
         for i in 0..3 {
             for j in 0..3 {
                 self.bread[(SECOND[i], FIRST[j])] += coupling[(i, j)];
