@@ -16,7 +16,7 @@ use crate::judge::{self, MapVerdict};
 use crate::results::ResultFolder;
 use crate::session::{Session, progress, stop_signal};
 use crate::summary::{Index, SceneEntry, Summary};
-use crate::{Ending, Usage};
+use crate::{Ending, Usage, terminal};
 
 /// Run a source, be it one sequence or a set of scenes.
 pub fn run(args: &RunArgs) -> Result<Ending> {
@@ -59,7 +59,7 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
     };
     folder.write_json("summary.json", &index)?;
     if args.json {
-        writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&index)?)?;
+        writeln!(terminal::stdout(), "{}", serde_json::to_string_pretty(&index)?)?;
     }
     if complete && index.scenes.iter().all(|scene| !scene.counts.contains_key("ok")) {
         bail!("{}: no scene gave a motion; see the status in each motion.csv", args.source.display());
@@ -215,7 +215,7 @@ fn answered(source: &Path, done: &DoneSequence) -> Result<()> {
 }
 
 fn print_result(args: &RunArgs, summary: &Summary, out: &Path) -> Result<()> {
-    let mut stdout = std::io::stdout().lock();
+    let mut stdout = terminal::stdout();
     if args.json {
         writeln!(stdout, "{}", serde_json::to_string_pretty(summary)?)?;
         return Ok(());
