@@ -79,8 +79,9 @@ fn resolve_config(args: &RunArgs) -> Result<Config> {
             let text = std::fs::read_to_string(path)
                 .with_context(|| format!("{}: cannot be read", path.display()))?;
             toml::from_str(&text).map_err(|e| {
-                let line = e.span().map_or(0, |s| text[..s.start].lines().count().max(1));
-                anyhow!("{}:{line}: {}", path.display(), e.message().replace('\n', " "))
+                let breaks = |end: usize| text.bytes().take(end).filter(|&b| b == b'\n').count();
+                let line = e.span().map_or(String::new(), |s| format!(":{}", breaks(s.start) + 1));
+                anyhow!("{}{line}: {}", path.display(), e.message().replace('\n', " "))
             })?
         }
     };
