@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, anyhow, bail};
 use egomotion::geometry::{Grid, StereoRig};
-use egomotion::pipeline::Config;
+use egomotion::pipeline::{Config, Observe};
 use egomotion_io::image;
 use egomotion_io::source::{FrameFiles, Sequence, Source};
 
@@ -101,6 +101,10 @@ fn resolve_config(args: &RunArgs) -> Result<Config> {
         config.seed = seed;
     }
     config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
+    if args.maps && config.observe == Observe::Sparse {
+        let reason = "--maps needs the maps of every pixel: use observe dense (the default), not sparse";
+        return Err(Usage(reason.into()).into());
+    }
     Ok(config)
 }
 
