@@ -18,6 +18,7 @@ use crate::results::{About, ResultFolder};
 use crate::run::set_threads;
 use crate::session::{Outcome, Row, Session, progress, stop_signal};
 use crate::summary::Summary;
+use crate::terminal;
 
 /// Rays along each side of a pixel that shows an edge.
 const SAMPLES: usize = 2;
@@ -41,7 +42,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         maps: false,
         progress: progress(sequence.frames(), args.quiet),
     };
-    let mut stdout = std::io::stdout();
+    let mut stdout = terminal::stdout();
     writeln!(
         stdout,
         "A robot drives {} frames through a rendered room; φ is the motion of the scene",
@@ -57,7 +58,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         |row| {
             if row.motion.frame > 0 {
                 verdicts.add(&sequence, row);
-                session.progress.suspend(|| writeln!(std::io::stdout(), "{}", line(row)))?;
+                session.progress.suspend(|| writeln!(terminal::stdout(), "{}", line(row)))?;
             }
             Ok(())
         },

@@ -8,6 +8,7 @@ use egomotion::metrics::{KITTI_LENGTHS_M, kitti_drift, relative_pose_error};
 use egomotion_io::trajectory::{Format, read};
 
 use crate::args::{EvaluateArgs, FormatArg};
+use crate::terminal::{self, tell};
 use crate::{Ending, Usage};
 
 /// Read both trajectories, compare them row by row, print.
@@ -25,14 +26,14 @@ pub fn evaluate(args: &EvaluateArgs) -> Result<Ending> {
     };
     let (mut estimate, mut truth) = (poses(&args.estimate)?, poses(&args.truth)?);
     if estimate.len() != truth.len() {
-        eprintln!(
-            "egomotion: {} has {} poses, {} has {}; the first {} of both are compared",
+        tell(format_args!(
+            "{} has {} poses, {} has {}; the first {} of both are compared",
             args.estimate.display(),
             estimate.len(),
             args.truth.display(),
             truth.len(),
             estimate.len().min(truth.len())
-        );
+        ));
     }
     let count = estimate.len().min(truth.len());
     estimate.truncate(count);
@@ -45,7 +46,7 @@ pub fn evaluate(args: &EvaluateArgs) -> Result<Ending> {
         );
     };
     let drift = kitti_drift(&estimate, &truth, &lengths);
-    let mut out = std::io::stdout().lock();
+    let mut out = terminal::stdout();
     if args.json {
         let report = serde_json::json!({
             "frames": count,

@@ -7,11 +7,12 @@ use egomotion_io::source::{Sequence, Source};
 
 use crate::Ending;
 use crate::args::InfoArgs;
+use crate::terminal;
 
 /// Print layout, frames, rig, time stamps and truth.
 pub fn info(args: &InfoArgs) -> Result<Ending> {
     let source = Source::open(&args.source)?;
-    let mut out = std::io::stdout().lock();
+    let mut out = terminal::stdout();
     writeln!(out, "{}", source.path.display())?;
     writeln!(out, "layout      {} ({})", source.layout, source.reason)?;
     if source.layout.is_scene_set() {

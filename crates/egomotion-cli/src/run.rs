@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, anyhow, bail};
 use egomotion::geometry::{Grid, StereoRig};
-use egomotion::pipeline::Config;
+use egomotion::pipeline::{Config, Observe};
 use egomotion_io::image;
 use egomotion_io::source::{FrameFiles, Sequence, Source};
 
@@ -16,7 +16,7 @@ use crate::judge::{self, MapVerdict};
 use crate::results::{About, ResultFolder};
 use crate::session::{Session, progress, stop_signal};
 use crate::summary::{Index, SceneEntry, Summary};
-use crate::{Ending, Usage};
+use crate::{Ending, Usage, terminal};
 
 /// Run a source, be it one sequence or a set of scenes.
 pub fn run(args: &RunArgs) -> Result<Ending> {
@@ -59,7 +59,7 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
     };
     folder.write_json("summary.json", &index)?;
     if args.json {
-        writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&index)?)?;
+        writeln!(terminal::stdout(), "{}", serde_json::to_string_pretty(&index)?)?;
     }
     if complete && index.scenes.iter().all(|scene| !scene.counts.contains_key("ok")) {
         bail!("{}: no scene gave a motion; see the status in each motion.csv", args.source.display());
@@ -79,8 +79,9 @@ fn resolve_config(args: &RunArgs) -> Result<Config> {
             let text = std::fs::read_to_string(path)
                 .with_context(|| format!("{}: cannot be read", path.display()))?;
             toml::from_str(&text).map_err(|e| {
-                let line = e.span().map_or(0, |s| text[..s.start].lines().count().max(1));
-                anyhow!("{}:{line}: {}", path.display(), e.message().replace('\n', " "))
+                let breaks = |end: usize| text.bytes().take(end).filter(|&b| b == b'\n').count();
+                let line = e.span().map_or(String::new(), |s| format!(":{}", breaks(s.start) + 1));
+                anyhow!("{}{line}: {}", path.display(), e.message().replace('\n', " "))
             })?
         }
     };
@@ -100,6 +101,10 @@ fn resolve_config(args: &RunArgs) -> Result<Config> {
         config.seed = seed;
     }
     config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
+    if args.maps && config.observe == Observe::Sparse {
+        let reason = "--maps needs the maps of every pixel: use observe dense (the default), not sparse";
+        return Err(Usage(reason.into()).into());
+    }
     Ok(config)
 }
 
@@ -223,7 +228,7 @@ fn answered(source: &Path, done: &DoneSequence) -> Result<()> {
 }
 
 fn print_result(args: &RunArgs, summary: &Summary, out: &Path) -> Result<()> {
-    let mut stdout = std::io::stdout().lock();
+    let mut stdout = terminal::stdout();
     if args.json {
         writeln!(stdout, "{}", serde_json::to_string_pretty(summary)?)?;
         return Ok(());

@@ -13,6 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::feed::{Fetched, with_frames};
 use crate::report::{Album, FramePictures};
 use crate::results::ResultFolder;
+use crate::terminal::tell;
 
 /// What is to be run.
 pub struct Session<'a> {
@@ -100,7 +101,7 @@ impl Session<'_> {
                 if let Err(why) = &motion.motion
                     && motion.frame > 0
                 {
-                    self.progress.suspend(|| eprintln!("egomotion: frame {index}: {why}"));
+                    self.progress.suspend(|| tell(format_args!("frame {index}: {why}")));
                 }
                 tally.add(decode_ms, &motion.stages);
                 trajectory.push(&motion);

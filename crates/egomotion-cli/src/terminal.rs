@@ -1,0 +1,39 @@
+//! Words for people and scripts, on standard output and standard error.
+//!
+//! Nobody listening (`egomotion … | head`) is no failure: the run goes on and its files are written.
+
+use std::io::{ErrorKind, Result, Stderr, Stdout, Write};
+
+/// A stream whose reader may go away.
+pub struct Stream<W>(W);
+
+/// Standard output, where results go.
+pub fn stdout() -> Stream<Stdout> {
+    Stream(std::io::stdout())
+}
+
+/// Standard error, where messages go.
+pub fn stderr() -> Stream<Stderr> {
+    Stream(std::io::stderr())
+}
+
+/// One line on standard error. Where that fails there is no place left to say so: `eprintln!` would panic.
+pub fn tell(message: impl std::fmt::Display) {
+    let _ = writeln!(stderr(), "egomotion: {message}");
+}
+
+impl<W: Write> Write for Stream<W> {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize> {
+        match self.0.write(bytes) {
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(bytes.len()),
+            other => other,
+        }
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        match self.0.flush() {
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+            other => other,
+        }
+    }
+}

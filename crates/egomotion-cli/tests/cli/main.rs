@@ -1,0 +1,18 @@
+//! The command's contract, seen from outside: a process, its options, streams, files and exit codes.
+#![allow(missing_docs)]
+
+mod bad_config;
+mod bad_input;
+mod bad_output;
+mod combinations;
+mod demo;
+mod evaluate;
+mod gaps;
+mod info;
+mod interrupt;
+mod maps;
+mod outputs;
+mod process;
+mod recording;
+mod selection;
+mod table;
