@@ -70,6 +70,13 @@ pub struct Linearised {
     by_phi: SMatrix<f64, 3, 6>,
 }
 
+impl Linearised {
+    /// S⁻¹; `None` unless S is positive definite, which rounding or a careless caller may break.
+    fn weight(&self) -> Option<Matrix3<f64>> {
+        self.cov.cholesky().map(|c| c.inverse())
+    }
+}
+
 /// An observation that maximum likelihood can use.
 pub trait Measurement: Sync {
     /// Image coordinates (x, y), in pixels, to find the observation's block.
@@ -78,6 +85,17 @@ pub trait Measurement: Sync {
     fn structure(&self) -> Vector3<f64>;
     /// Linearise about a motion and a structure, and improve the structure; `None` behind the camera.
     fn linearise(&self, structure: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised>;
+}
+
+/// How far a structure may move from where it was measured, in standard deviations.
+const MOST_PULL: f64 = 5.0;
+
+/// Factor that holds a structure back when its squared distance from the measured one is `square`.
+///
+/// An inlier is never pulled so far. An outlier would be pulled to where its derivatives are so
+/// large that no robust weight tames them.
+fn restraint(square: f64) -> f64 {
+    if square > MOST_PULL * MOST_PULL { MOST_PULL / square.sqrt() } else { 1.0 }
 }
 
 impl Measurement for StereoTrack {
@@ -97,7 +115,9 @@ impl Measurement for StereoTrack {
         let misclosure = self.after.mean - predicted - by_structure * (self.before.mean - *s);
         let gain = self.before.cov * by_structure.transpose();
         let cov = self.after.cov + by_structure * gain;
-        let improved = self.before.mean + gain * (cov.try_inverse()? * misclosure);
+        let pull = cov.try_inverse()? * misclosure;
+        let shift = gain * pull;
+        let improved = self.before.mean + shift * restraint(pull.dot(&(by_structure * shift)));
         // A first guess may be wild; a structure must stay in front of the camera.
         if improved.z > 0.1 * s.z {
             *s = improved;
@@ -149,7 +169,8 @@ impl Measurement for StereoFlow {
         );
         let gain: Vector3<f64> = pick * self.measured.cov * Vector4::x();
         let cov = pick * self.measured.cov * pick.transpose();
-        let improved = measured[0] - gain.dot(&(cov.try_inverse()? * misclosure));
+        let shift = -gain.dot(&(cov.try_inverse()? * misclosure));
+        let improved = measured[0] + shift * restraint(shift * shift / self.measured.cov[(0, 0)]);
         if improved > 0.1 * d {
             s.z = improved;
         }
@@ -170,7 +191,7 @@ struct Step {
 
 impl Step {
     fn add(&mut self, l: &Linearised, kernel: &StudentT, scale2: f64) {
-        let Some(inverse) = l.cov.try_inverse() else { return };
+        let Some(inverse) = l.weight() else { return };
         let q = l.misclosure.dot(&(inverse * l.misclosure));
         let weight = kernel.weight(q / scale2, 3.0);
         let weighted = l.by_phi.transpose() * inverse;
@@ -287,7 +308,7 @@ fn robust_scale2<M: Measurement>(observations: &[M], phi: &Twist, rig: &StereoRi
 /// q with the structure held at its measured value (the Sampson form).
 fn sampson<M: Measurement>(observation: &M, at: &At<'_>) -> Option<f64> {
     let l = observation.linearise(&mut observation.structure(), at)?;
-    Some(l.misclosure.dot(&(l.cov.try_inverse()? * l.misclosure)))
+    Some(l.misclosure.dot(&(l.weight()? * l.misclosure)))
 }
 
 fn finish<M: Measurement>(

@@ -72,7 +72,8 @@ impl DensePair<'_> {
         let own = Vector2::new(shared(later.variance()), 0.0);
         let slope = half * gradient;
         let variance = later.variance() + gradient.dot(&slope) + 2.0 * own.dot(&gradient).max(0.0);
-        let after = Gaussian { mean: Vector3::new(x, y, later.value()), cov: joint(&half, own + slope, variance) };
+        let after =
+            Gaussian { mean: Vector3::new(x, y, later.value()), cov: joint(&half, own + slope, variance) };
         Some(StereoTrack { before, after })
     }
 
@@ -167,9 +168,15 @@ impl DensePair<'_> {
 /// The covariance of (x, y, d) from that of (x, y), its covariance with d, and the variance of d.
 fn joint(place: &Matrix2<f64>, cross: Vector2<f64>, variance: f64) -> Matrix3<f64> {
     Matrix3::new(
-        place[(0, 0)], place[(0, 1)], cross.x, //
-        place[(0, 1)], place[(1, 1)], cross.y, //
-        cross.x, cross.y, variance,
+        place[(0, 0)],
+        place[(0, 1)],
+        cross.x, //
+        place[(0, 1)],
+        place[(1, 1)],
+        cross.y, //
+        cross.x,
+        cross.y,
+        variance,
     )
 }
 
