@@ -195,9 +195,9 @@ fn too_few_rows_are_refused() {
 #[track_caller]
 fn says_what_is_observed(found: &MotionEstimate, truth: &Twist, observed: [bool; 6]) {
     assert_eq!(found.observed, observed);
-    for i in 0..6 {
+    for (i, is_observed) in observed.into_iter().enumerate() {
         let (value, variance) = (found.theta.mean[i], found.theta.cov[(i, i)]);
-        if observed[i] {
+        if is_observed {
             assert!(
                 (value - truth.vector()[i]).abs() < EXACT && variance.is_finite(),
                 "{i}: {value} ± {variance}"
@@ -324,7 +324,6 @@ fn depth_changes_of_planes_and_a_sphere() {
         for estimator in ["ls", "wls", "irls"] {
             let fit = linear(estimator, &rows).unwrap_or_else(|why| panic!("{name} {estimator}: {why}"));
             assert_eq!(fit.observability.rank(), rank, "{name} {estimator}");
-            println!("{name} {estimator}");
             says_what_is_observed(&fit.estimate(&rows), &truth, observed);
         }
     }
@@ -380,6 +379,22 @@ fn no_information_is_no_answer() {
     let mut behind = tracks(30, &phi(), &rig, &mut rng);
     behind.iter_mut().for_each(|track| track.before.mean.z = -1.0);
     assert!(maximum_likelihood(&behind, &rig, &Twist::zero(), None, &StudentT::default()).is_err());
+}
+
+#[test]
+fn a_single_block_has_no_scatter_to_judge_by() {
+    let (rig, mut rng) = (rig(), random(11));
+    let whole = Blocks::over(&rig, 1000.0);
+    assert_eq!(whole.count(), 1);
+    let tracks = noisy_tracks(100, &phi(), &rig, &mut rng);
+    let unknown = |found: &MotionEstimate| found.theta.cov.diagonal().iter().all(|v| v.is_infinite());
+    let found = maximum_likelihood(&tracks, &rig, &phi(), Some(&whole), &GAUSSIAN).unwrap().motion;
+    assert!(unknown(&found), "{found:?}");
+    let pairs: Vec<PointPair> = tracks.iter().map(|t| PointPair::from_track(t, &rig, 0).unwrap()).collect();
+    assert!(unknown(&align(&pairs, Form::Rigid, &Fitting::LeastSquares).unwrap()));
+    let mut rows = scattered_depth_rows(50, &phi(), &rig, &mut rng);
+    rows.iter_mut().for_each(|row| (row.block, row.b) = (0, row.b + 0.01 * normals::<1>(&mut rng)[0]));
+    assert!(unknown(&linear("ls", &rows).unwrap().estimate(&rows)));
 }
 
 // ---- what does not belong ----

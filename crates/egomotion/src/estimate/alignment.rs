@@ -133,7 +133,7 @@ impl Moments {
         let (smallest, largest) = (eigen.min(), eigen.max());
         let middle = eigen.sum() - smallest - largest;
         let needed = if form == Form::Affine { smallest } else { middle };
-        if !(needed > rounding.max(1e-12 * largest)) {
+        if needed.is_nan() || needed <= rounding.max(1e-12 * largest) {
             return None;
         }
         let linear = match form {

@@ -30,7 +30,9 @@ impl Trajectory {
         };
         let (start, start_s) = (self.poses[reference], self.times_s[reference]);
         for k in reference + 1..self.poses.len() {
+            // Frames without an answer may have any time, or none: they stay between their neighbours.
             let share = (self.times_s[k] - start_s) / dt;
+            let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
             // The scene moves by exp(φ), so the camera by its inverse.
             self.poses[k] = start.after(&motion.phi().scaled(share).exp().inverse());
         }
