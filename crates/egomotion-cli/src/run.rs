@@ -151,7 +151,7 @@ fn run_sequence(
     let outcome = session.run(
         stop,
         &folder,
-        |k| feed::read(&frames[k].0, frames[k].1),
+        |k| feed::read(frames[k].0, frames[k].1),
         |row, _| {
             if let Err(why) = &row.motion.motion
                 && row.motion.frame > 0
