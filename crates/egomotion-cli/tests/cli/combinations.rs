@@ -37,9 +37,10 @@ fn run_all(observe: &str, approach: &str) {
         assert_eq!((rows.len(), trajectory(&out).len()), (2, 3), "{options}");
         for (k, row) in rows.iter().enumerate() {
             assert_eq!((row.status(), row.text("observed")), ("ok", "111111"), "{options}");
-            let error = phi(row).vector() - drive().phi(k).unwrap().vector();
-            let (t, r) = (error.fixed_rows::<3>(0).norm(), error.fixed_rows::<3>(3).norm());
-            eprintln!("{observe} {options}: {:.2} mm {:.3} deg", 1e3 * t, r.to_degrees());
+            // What each method and estimator is worth is the study's question. Here: the right magnitude.
+            let truth = drive().phi(k).unwrap().vector();
+            let error = (phi(row).vector() - truth).fixed_rows::<3>(0).norm();
+            assert!(error < 2.0 * truth.fixed_rows::<3>(0).norm(), "{options}: {error}");
             let variance = |i| row.number(&format!("cov_{i}{i}"));
             assert!((0..6).all(|i| variance(i) > 0.0 && variance(i).is_finite()), "{options}");
         }

@@ -48,7 +48,7 @@ fn maps_hold_what_their_names_say() {
     let read = |folder: &str| pfm::read(&dense_results().join(folder).join("000001.pfm")).unwrap();
     let (view, phi) = (drive().view(1).unwrap(), drive().phi(1).unwrap());
     let at = |u: usize, v: usize| view.truth_at(u as f64, v as f64).filter(|truth| truth.in_right);
-    let moved = |u: usize, v: usize| at(u, v).map(|truth| (truth.clone(), view.motion_at(&truth, &phi)));
+    let moved = |u: usize, v: usize| at(u, v).map(|truth| (truth, view.motion_at(&truth, &phi)));
     // Disparity is some 10 px, its change with the frame's index and the flow are of the order of a pixel.
     assert!(median_error(&read("disparity"), |u, v| at(u, v).map(|truth| truth.disparity_px())) < 0.2);
     // Points come about 50 mm nearer per frame; a map per second, or of the wrong sign, is far off.

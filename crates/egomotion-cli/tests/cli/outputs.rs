@@ -71,39 +71,6 @@ fn every_row_answers_near_the_truth() {
     }
 }
 
-/// Time until the nearest thing in the vehicle's way (1 m square) reaches the camera if everything goes
-/// on straight at its speed of frame `k`; from the truth at every second pixel.
-fn true_impact_s(k: usize) -> Option<f64> {
-    let (view, motion) = (drive().view(k)?, drive().phi(k)?.exp());
-    let pixels = (0..SIZE.1).step_by(2).flat_map(|v| (0..SIZE.0).step_by(2).map(move |u| (u, v)));
-    let seconds = pixels.filter_map(|(u, v)| {
-        let before = view.truth_at(u as f64, v as f64)?.point;
-        let later = motion.apply(&before);
-        let step = later - before;
-        let frames = -later.z / step.z;
-        let end = later + step * frames;
-        (frames > 0.0 && end.x.abs() <= 0.5 && end.y.abs() <= 0.5).then_some(frames * drive().interval_s)
-    });
-    seconds.min_by(f64::total_cmp)
-}
-
-#[test]
-fn time_to_impact_is_that_of_the_nearest_obstacle() {
-    let rows = motion(dense_results());
-    for (k, row) in rows.iter().enumerate() {
-        let columns = ["impact_lo_s", "impact_s", "impact_hi_s"];
-        eprintln!("{k}: {:?}, truth {:?}", columns.map(|c| row.text(c)), true_impact_s(k));
-        if columns.iter().any(|c| !row.text(c).is_empty()) {
-            let [lo, at, hi] = columns.map(|c| row.number(c));
-            assert!(0.0 < lo && lo <= at && at <= hi, "{lo} {at} {hi}");
-        }
-    }
-    // At first the robot drives straight at the room's obstacle. The answer is the median of a block of
-    // pixels, the truth the nearest single one.
-    let (answer, truth) = (rows[0].number("impact_s"), true_impact_s(0).unwrap());
-    assert!((0.95..1.2).contains(&(answer / truth)), "{answer} s, truth {truth} s");
-}
-
 #[test]
 fn there_is_a_pose_for_each_frame_and_it_follows_from_motion_csv() {
     let poses = trajectory(dense_results());

@@ -252,7 +252,8 @@ impl Strip {
     /// Hamming distances of row `v`.
     ///
     /// A match outside the right image is neither confirmed nor refuted: it costs as much as the
-    /// best one inside.
+    /// mean one inside. Were it as cheap as the best, the smoothness of these equal costs would win
+    /// wherever the window of disparities sticks out.
     fn match_row(&mut self, pair: &Pair<'_>, v: usize) {
         let width = pair.left.width();
         let row = v * width..(v + 1) * width;
@@ -264,7 +265,8 @@ impl Strip {
             let candidates = &self.reversed[width - 1 - u..];
             hamming(word, candidates, inside);
             if !outside.is_empty() {
-                outside.fill(inside.iter().copied().fold(u8::MAX, u8::min));
+                let sum: usize = inside.iter().map(|&cost| usize::from(cost)).sum();
+                outside.fill((sum / inside.len().max(1)) as u8);
             }
         }
     }
