@@ -32,6 +32,8 @@ pub struct MaximumLikelihoodOptions {
     pub start_observations: usize,
     /// Seed of the robust start.
     pub seed: u64,
+    /// Standard deviation of the bias that all matches of a frame share, in pixels; see [`super::systematic`].
+    pub localisation_bias_px: f64,
 }
 
 impl Default for MaximumLikelihoodOptions {
@@ -42,6 +44,7 @@ impl Default for MaximumLikelihoodOptions {
             confidence: 0.999,
             start_observations: 600,
             seed: 1,
+            localisation_bias_px: 0.0015,
         }
     }
 }
@@ -65,14 +68,14 @@ impl<'a> At<'a> {
 /// Misclosure e of an observation, its covariance S, and −∂e/∂φ.
 #[derive(Debug, Clone, Copy)]
 pub struct Linearised {
-    misclosure: Vector3<f64>,
-    cov: Matrix3<f64>,
-    by_phi: SMatrix<f64, 3, 6>,
+    pub(super) misclosure: Vector3<f64>,
+    pub(super) cov: Matrix3<f64>,
+    pub(super) by_phi: SMatrix<f64, 3, 6>,
 }
 
 impl Linearised {
     /// S⁻¹; `None` unless S is positive definite, which rounding or a careless caller may break.
-    fn weight(&self) -> Option<Matrix3<f64>> {
+    pub(super) fn weight(&self) -> Option<Matrix3<f64>> {
         self.cov.cholesky().map(|c| c.inverse())
     }
 }
@@ -85,6 +88,12 @@ pub trait Measurement: Sync {
     fn structure(&self) -> Vector3<f64>;
     /// Linearise about a motion and a structure, and improve the structure; `None` behind the camera.
     fn linearise(&self, structure: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised>;
+    /// How far the point moves in the left image, in pixels.
+    fn displacement_px(&self) -> f64;
+    /// The same observation with every disparity larger by so many pixels.
+    fn with_disparity_offset(&self, px: f64) -> Self
+    where
+        Self: Sized;
 }
 
 /// How far a structure may move from where it was measured, in standard deviations.
@@ -124,6 +133,17 @@ impl Measurement for StereoTrack {
         }
         let by_phi = by_moved * RigidMotion::point_jacobian(&moved) * at.left_jacobian;
         Some(Linearised { misclosure, cov, by_phi })
+    }
+
+    fn displacement_px(&self) -> f64 {
+        (self.after.mean - self.before.mean).xy().norm()
+    }
+
+    fn with_disparity_offset(&self, px: f64) -> Self {
+        let mut shifted = *self;
+        shifted.before.mean.z += px;
+        shifted.after.mean.z += px;
+        shifted
     }
 }
 
@@ -175,6 +195,16 @@ impl Measurement for StereoFlow {
             s.z = improved;
         }
         Some(Linearised { misclosure, cov, by_phi })
+    }
+
+    fn displacement_px(&self) -> f64 {
+        self.measured.mean.fixed_rows::<2>(1).norm()
+    }
+
+    fn with_disparity_offset(&self, px: f64) -> Self {
+        let mut shifted = *self;
+        shifted.measured.mean[0] += px;
+        shifted
     }
 }
 

@@ -8,6 +8,7 @@ pub mod m_estimator;
 pub mod maximum_likelihood;
 pub mod observability;
 pub mod row;
+pub mod systematic;
 pub mod two_step;
 
 use nalgebra::{SMatrix, SVector};

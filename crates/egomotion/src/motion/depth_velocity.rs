@@ -146,17 +146,22 @@ pub struct RigidPrediction<'a> {
     motion: RigidMotion,
     left_jacobian: nalgebra::Matrix6<f64>,
     cov: nalgebra::Matrix6<f64>,
+    by_disparity_offset: Vector6<f64>,
 }
 
 impl<'a> RigidPrediction<'a> {
     /// Predict with φ ± its covariance; `None` where some component of φ is unknown.
-    pub fn new(phi: &Gaussian<6>, rig: &'a StereoRig) -> Option<Self> {
+    ///
+    /// `by_disparity_offset` is how φ changes per pixel of an offset common to all disparities: with
+    /// the rig's `calibration_sigma_px` it makes the part of the variance that is calibration's.
+    pub fn new(phi: &Gaussian<6>, by_disparity_offset: &Vector6<f64>, rig: &'a StereoRig) -> Option<Self> {
         let twist = Twist::from_vector(&phi.mean);
         phi.cov.iter().all(|v| v.is_finite()).then(|| Self {
             rig,
             motion: twist.exp(),
             left_jacobian: twist.left_jacobian(),
             cov: phi.cov,
+            by_disparity_offset: *by_disparity_offset,
         })
     }
 
@@ -189,6 +194,10 @@ impl<'a> RigidPrediction<'a> {
             cross,
             vz_by_d * vz_by_d * var + by_phi.dot(&(self.cov * by_phi)),
         );
+        // The offset moves φ and this pixel's own disparity together.
+        let by_offset = Vector2::new(by_d.z, by_phi.dot(&self.by_disparity_offset) + vz_by_d)
+            * self.rig.calibration_sigma_px;
+        let cov = cov + by_offset * by_offset.transpose();
         Some(DepthVelocity { z_vz: Gaussian { mean: Vector2::new(p.z, moved.z - p.z), cov } })
     }
 }

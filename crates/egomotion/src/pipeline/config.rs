@@ -7,6 +7,7 @@ use crate::estimate::lmeds::LmedsOptions;
 use crate::estimate::m_estimator::StudentT;
 use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
 use crate::motion::impact::VehicleWindow;
+use crate::observe::flow::FlowError;
 use crate::observe::{DisparityOptions, FlowOptions, TrackOptions};
 
 /// Which equations determine φ.
@@ -115,7 +116,7 @@ impl Default for Config {
 }
 
 /// Why a combination of choices has no meaning.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 pub enum ConfigError {
     /// Maximum likelihood has its own robust weights.
     #[error(
@@ -132,9 +133,12 @@ pub enum ConfigError {
         "method dcce needs the gradient of disparity, which tracks do not have: use observe dense (the default), not sparse"
     )]
     SparseDepthChange,
-    /// A size that must be positive is not.
-    #[error("{0} must be positive")]
-    NotPositive(&'static str),
+    /// A number lies outside its range.
+    #[error("{0}")]
+    Range(&'static str),
+    /// A setting of the dense flow lies outside its range.
+    #[error(transparent)]
+    Flow(#[from] FlowError),
 }
 
 impl Config {
@@ -153,18 +157,49 @@ impl Config {
         if self.method == Method::Dcce && self.observe == Observe::Sparse {
             return Err(ConfigError::SparseDepthChange);
         }
-        let positive = |value: f64| value.is_finite() && value > 0.0;
-        for (name, value) in [
-            ("block_px", self.block_px),
-            ("sample_step_px", self.sample_step_px as f64),
-            ("tracks.corners", self.tracks.corners as f64),
-            ("irls.nu", self.irls.nu.min(1e9)),
-            ("maximum_likelihood.kernel.nu", self.maximum_likelihood.kernel.nu.min(1e9)),
-        ] {
-            if !positive(value) {
-                return Err(ConfigError::NotPositive(name));
-            }
-        }
+        self.check_ranges()?;
+        self.flow.check()?;
         Ok(())
+    }
+
+    fn check_ranges(&self) -> Result<(), ConfigError> {
+        let ml = &self.maximum_likelihood;
+        let kernels = [&self.irls, &ml.kernel];
+        // Beyond these the number of subsets (59) runs into the millions.
+        let searchable = |confidence: f64, outliers: f64| {
+            (0.0..=0.9999).contains(&confidence) && (0.0..=0.7).contains(&outliers)
+        };
+        let rules = [
+            (self.block_px.is_finite() && self.block_px >= 4.0, "block_px must be at least 4"),
+            (self.sample_step_px >= 1, "sample_step_px must be at least 1"),
+            (self.tracks.corners >= 1, "tracks.corners must be at least 1"),
+            (self.tracks.iterations >= 1, "tracks.iterations must be at least 1"),
+            (self.tracks.back_tolerance_px > 0.0, "tracks.back_tolerance_px must be positive"),
+            (self.tracks.largest_residual > 0.0, "tracks.largest_residual must be positive"),
+            (self.disparity.levels >= 1, "disparity.levels must be at least 1"),
+            (self.disparity.refinement_steps >= 1, "disparity.refinement_steps must be at least 1"),
+            (kernels.iter().all(|k| k.nu > 0.0), "nu must be positive"),
+            (kernels.iter().all(|k| k.iterations >= 1), "iterations must be at least 1"),
+            (kernels.iter().all(|k| k.tolerance > 0.0), "tolerance must be positive"),
+            (
+                searchable(self.lmeds.confidence, self.lmeds.outliers),
+                "lmeds.confidence must be 0 to 0.9999, lmeds.outliers 0 to 0.7",
+            ),
+            (self.lmeds.cut > 0.0, "lmeds.cut must be positive"),
+            (
+                searchable(ml.confidence, ml.outliers),
+                "maximum_likelihood.confidence must be 0 to 0.9999, maximum_likelihood.outliers 0 to 0.7",
+            ),
+            (ml.start_observations >= 4, "maximum_likelihood.start_observations must be at least 4"),
+            (
+                ml.localisation_bias_px.is_finite() && ml.localisation_bias_px >= 0.0,
+                "maximum_likelihood.localisation_bias_px must not be negative",
+            ),
+            (
+                self.window.left_m < self.window.right_m && self.window.top_m < self.window.bottom_m,
+                "window: left_m must be less than right_m, top_m less than bottom_m",
+            ),
+        ];
+        rules.iter().find(|(ok, _)| !ok).map_or(Ok(()), |(_, rule)| Err(ConfigError::Range(rule)))
     }
 }

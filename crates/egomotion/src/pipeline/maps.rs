@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::config::{Approach, Config, Method};
-use crate::estimate::{Blocks, MotionEstimate};
+use crate::estimate::Blocks;
 use crate::geometry::{Field, Grid, StereoRig};
 use crate::motion::DepthVelocity;
 use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
@@ -40,16 +40,15 @@ struct Pixel {
 /// the rigid scene's, except where the measured change of disparity contradicts it.
 pub fn motion_maps(
     pair: &DensePair<'_>,
-    motion: Option<&MotionEstimate>,
+    rigid: Option<&RigidPrediction<'_>>,
     config: &Config,
     dt_s: f64,
 ) -> (MotionMaps, Vec<Neighbourhood>) {
     let (width, height) = pair.flow.size();
-    let rigid = motion.and_then(|m| RigidPrediction::new(&m.theta, pair.rig));
     let blocks = Blocks::over(pair.rig, config.block_px);
     let rows: Vec<Vec<Option<Pixel>>> = (0..height)
         .into_par_iter()
-        .map(|v| (0..width).map(|u| pixel_at(pair, rigid.as_ref(), config, (u, v), dt_s)).collect())
+        .map(|v| (0..width).map(|u| pixel_at(pair, rigid, config, (u, v), dt_s)).collect())
         .collect();
     let mut seen = vec![Neighbourhood::default(); blocks.count()];
     for (v, row) in rows.iter().enumerate() {
@@ -125,7 +124,7 @@ fn velocity_at(
 /// The nearest obstacle's points among tracks, by block.
 pub fn track_neighbourhoods(
     tracks: &[StereoTrack],
-    motion: &MotionEstimate,
+    rigid: &RigidPrediction<'_>,
     rig: &StereoRig,
     config: &Config,
     dt_s: f64,
@@ -133,7 +132,6 @@ pub fn track_neighbourhoods(
     // Tracks are about thirty pixels apart, so a block must be larger to hold several.
     let blocks = Blocks::over(rig, 3.0 * config.block_px);
     let mut seen = vec![Neighbourhood::default(); blocks.count()];
-    let Some(rigid) = RigidPrediction::new(&motion.theta, rig) else { return seen };
     for track in tracks {
         let xyd = &track.before.mean;
         let measured = depth_velocity::dv_discrete(track, rig.depth_disparity_product());
@@ -143,7 +141,7 @@ pub fn track_neighbourhoods(
         let crossing = rig
             .point(xyd)
             .zip(impact)
-            .filter(|(before, impact)| crosses(&rigid, before, impact, config, dt_s));
+            .filter(|(before, impact)| crosses(rigid, before, impact, config, dt_s));
         seen[blocks.index(xyd.x, xyd.y)].add(crossing.map(|(_, impact)| impact));
     }
     seen

@@ -7,6 +7,7 @@ use crate::estimate::least_squares::{Weighting, least_squares};
 use crate::estimate::lmeds::{LmedsOptions, lmeds};
 use crate::estimate::m_estimator::m_estimate;
 use crate::estimate::maximum_likelihood::{Measurement, maximum_likelihood};
+use crate::estimate::systematic::common_errors;
 use crate::estimate::two_step::two_step;
 use crate::estimate::{Blocks, Fit, MotionEstimate, Row, Unsolvable};
 use crate::geometry::{StereoRig, Twist};
@@ -104,9 +105,14 @@ impl Solver<'_> {
     }
 
     fn likelihood<M: Measurement>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
-        let kernel = &self.config.maximum_likelihood.kernel;
-        let found = maximum_likelihood(observations, self.rig, self.start, Some(&self.blocks), kernel)?;
-        Ok(found.motion)
+        let options = &self.config.maximum_likelihood;
+        let blocks = Some(&self.blocks);
+        let mut motion =
+            maximum_likelihood(observations, self.rig, self.start, blocks, &options.kernel)?.motion;
+        if let Some(common) = common_errors(observations, self.rig, &motion.phi(), &options.kernel) {
+            motion.theta.cov += common.localisation_covariance(options.localisation_bias_px);
+        }
+        Ok(motion)
     }
 
     fn depth_change(&self, changes: &[DepthChange]) -> Result<MotionEstimate, Unsolvable> {

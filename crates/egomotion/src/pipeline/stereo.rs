@@ -7,10 +7,12 @@ use thiserror::Error;
 use super::config::{Approach, Config, ConfigError, Method, Observe};
 use super::maps::{MotionMaps, motion_maps, track_neighbourhoods};
 use super::solve::{Observed, solve};
-use crate::estimate::maximum_likelihood::{maximum_likelihood, robust_start};
+use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood, robust_start};
+use crate::estimate::systematic::common_errors;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Field, Grid, Image, RigError, RigidMotion, StereoRig, Twist};
 use crate::motion::TimeToImpact;
+use crate::motion::depth_velocity::RigidPrediction;
 use crate::motion::impact::nearest;
 use crate::observe::tracks::{Hints, stereo_tracks};
 use crate::observe::{
@@ -114,7 +116,7 @@ pub struct FrameMotion {
 }
 
 /// Why a pipeline cannot be built.
-#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 pub enum PipelineError {
     /// The rig cannot measure.
     #[error(transparent)]
@@ -373,7 +375,8 @@ impl FramePair<'_> {
 
     /// The motion of most tracks.
     fn rough(&self, tracks: &[StereoTrack], prior: Option<&Twist>) -> Result<Twist, Unsolvable> {
-        let options = &self.config.maximum_likelihood;
+        let own = &self.config.maximum_likelihood;
+        let options = &MaximumLikelihoodOptions { seed: own.seed ^ self.config.seed, ..*own };
         let start = robust_start(tracks, self.rig, prior, options)?;
         Ok(maximum_likelihood(tracks, self.rig, &start, None, &options.kernel)?.motion.phi())
     }
@@ -387,8 +390,8 @@ impl FramePair<'_> {
         let motion = timed(&mut stages.estimate_ms, || {
             solve(&Observed::Sparse(tracks), self.rig, &rough?, self.config)
         });
-        let impact = motion.as_ref().ok().and_then(|motion| {
-            nearest(&mut track_neighbourhoods(tracks, motion, self.rig, self.config, self.dt_s()))
+        let impact = self.rigid(tracks, motion.as_ref().ok()).and_then(|rigid| {
+            nearest(&mut track_neighbourhoods(tracks, &rigid, self.rig, self.config, self.dt_s()))
         });
         PairResult { motion: motion.map_err(Unanswered::from), impact, flow: None, maps: None }
     }
@@ -430,14 +433,25 @@ impl FramePair<'_> {
         let motion = timed(&mut stages.estimate_ms, || {
             solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config)
         });
-        let (maps, mut seen) =
-            timed(&mut stages.maps_ms, || motion_maps(&pair, motion.as_ref().ok(), self.config, self.dt_s()));
+        let (maps, mut seen) = timed(&mut stages.maps_ms, || {
+            let rigid = self.rigid(tracks, motion.as_ref().ok());
+            motion_maps(&pair, rigid.as_ref(), self.config, self.dt_s())
+        });
         PairResult {
             motion: motion.map_err(Unanswered::from),
             impact: nearest(&mut seen),
             maps: Some(maps),
             flow: Some(flow),
         }
+    }
+
+    /// What every pixel would do as part of the still world.
+    fn rigid(&self, tracks: &[StereoTrack], motion: Option<&MotionEstimate>) -> Option<RigidPrediction<'_>> {
+        let motion = motion?;
+        let kernel = &self.config.maximum_likelihood.kernel;
+        let common = common_errors(tracks, self.rig, &motion.phi(), kernel);
+        let by_offset = common.map_or_else(nalgebra::Vector6::zeros, |c| c.by_disparity_offset);
+        RigidPrediction::new(&motion.theta, &by_offset, self.rig)
     }
 
     fn flow(&self, from: &Pyramid, to: &Pyramid, initial: Option<FlowField>) -> Option<FlowField> {

@@ -65,7 +65,10 @@ impl Default for FlowOptions {
 
 impl FlowOptions {
     /// Refuse what lies outside its range.
-    pub(super) fn check(&self) -> Result<(), FlowError> {
+    ///
+    /// # Errors
+    /// [`FlowError::Option`] names the rule.
+    pub fn check(&self) -> Result<(), FlowError> {
         let rules = [
             ((1..=search::PATCH).contains(&self.patch_stride_px), "patch_stride_px must be 1 … 8"),
             ((1..=15).contains(&self.window_radius_px), "window_radius_px must be 1 … 15"),

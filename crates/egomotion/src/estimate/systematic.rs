@@ -1,0 +1,113 @@
+//! Errors that all observations of a frame share, which no number of observations averages out.
+//!
+//! Two are named: a *localisation bias*, by which interpolation, perspective and noise shift every
+//! match a little the same way, and an unknown *offset of disparity*, by which the rig's calibration
+//! is wrong. Their effect on φ̂ follows from the normal equations: δφ = A⁻¹ Σ Gᵀ S⁻¹ δe.
+
+use nalgebra::{Matrix6, SMatrix, Vector6};
+
+use super::Observability;
+use super::m_estimator::StudentT;
+use super::maximum_likelihood::{At, Measurement};
+use crate::geometry::{StereoRig, Twist};
+
+/// How φ̂ answers to errors common to all observations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CommonErrors {
+    /// φ̂ per pixel by which every point is found too far in (x, y, d) after the motion, 6×3.
+    ///
+    /// A point that moves by less than a pixel counts in proportion: without motion both images are
+    /// sampled alike, and share their errors.
+    pub by_localisation: SMatrix<f64, 6, 3>,
+    /// φ̂ per pixel by which every disparity is too large, before and after.
+    pub by_disparity_offset: Vector6<f64>,
+}
+
+impl CommonErrors {
+    /// Covariance of φ that a localisation bias of standard deviation `sigma_px` in each of (x, y, d) adds.
+    pub fn localisation_covariance(&self, sigma_px: f64) -> Matrix6<f64> {
+        sigma_px * sigma_px * self.by_localisation * self.by_localisation.transpose()
+    }
+}
+
+/// Step of the numerical derivative by the offset of disparity, in pixels.
+const OFFSET_STEP_PX: f64 = 1e-3;
+
+/// The response of the maximum-likelihood estimate at φ; `None` where some direction is not determined.
+pub fn common_errors<M: Measurement>(
+    observations: &[M],
+    rig: &StereoRig,
+    phi: &Twist,
+    kernel: &StudentT,
+) -> Option<CommonErrors> {
+    let at = At::new(*phi, rig);
+    let mut information = Matrix6::zeros();
+    let mut response = SMatrix::<f64, 6, 4>::zeros();
+    for observation in observations {
+        let Some(l) = observation.linearise(&mut observation.structure(), &at) else { continue };
+        let shifted = observation.with_disparity_offset(OFFSET_STEP_PX);
+        let Some(s) = shifted.linearise(&mut shifted.structure(), &at) else { continue };
+        let Some(inverse) = l.weight() else { continue };
+        let weight = kernel.weight(l.misclosure.dot(&(inverse * l.misclosure)), 3.0);
+        let weighted = weight * l.by_phi.transpose() * inverse;
+        information += weighted * l.by_phi;
+        let share = observation.displacement_px().min(1.0);
+        let mut localisation = response.fixed_view_mut::<6, 3>(0, 0);
+        localisation += share * weighted;
+        let mut offset = response.fixed_view_mut::<6, 1>(0, 3);
+        offset += weighted * (s.misclosure - l.misclosure) / OFFSET_STEP_PX;
+    }
+    let observability = Observability::of(&information).ok()?;
+    let complete = observability.observed::<6>().iter().all(|&o| o);
+    let solved = information.cholesky()?.solve(&response);
+    complete.then(|| CommonErrors {
+        by_localisation: solved.fixed_view::<6, 3>(0, 0).into(),
+        by_disparity_offset: solved.fixed_view::<6, 1>(0, 3).into(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimate::maximum_likelihood::maximum_likelihood;
+    use crate::geometry::Gaussian;
+    use crate::observe::StereoTrack;
+    use nalgebra::Vector3;
+
+    fn tracks(rig: &StereoRig, phi: &Twist, bias: Vector3<f64>, offset: f64) -> Vec<StereoTrack> {
+        let variances = [0.01, 0.01, 0.02];
+        let place = |i: usize| {
+            let (a, b, c) = ((i * 37 % 200) as f64, (i * 53 % 150) as f64, (i * 17 % 31) as f64);
+            Vector3::new(a - 100.0, b - 75.0, 8.0 + c)
+        };
+        let moved = |xyd: &Vector3<f64>| rig.project(&phi.exp().apply(&rig.point(xyd).unwrap())).unwrap();
+        let d = Vector3::new(0.0, 0.0, offset);
+        (0..120)
+            .map(|i| StereoTrack {
+                before: Gaussian::independent((place(i) + d).into(), [0.0, 0.0, 0.02]),
+                after: Gaussian::independent((moved(&place(i)) + bias + d).into(), variances),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_response_is_what_the_estimator_does() {
+        let rig = StereoRig::new(400.0, (159.5, 119.5), 0.15, (320, 240)).unwrap();
+        let phi = Twist { t: Vector3::new(0.02, -0.01, -0.2), omega: Vector3::new(0.004, -0.006, 0.002) };
+        let kernel = StudentT { nu: f64::INFINITY, iterations: 50, tolerance: 1e-10 };
+        let solve = |bias, offset| {
+            let tracks = tracks(&rig, &phi, bias, offset);
+            maximum_likelihood(&tracks, &rig, &phi, None, &kernel).unwrap().motion.theta.mean - phi.vector()
+        };
+        let exact = tracks(&rig, &phi, Vector3::zeros(), 0.0);
+        let found = common_errors(&exact, &rig, &phi, &kernel).unwrap();
+        let scale = found.by_disparity_offset.amax();
+        for k in 0..3 {
+            let bias = Vector3::ith(k, 1e-3);
+            let error = solve(bias, 0.0) / 1e-3 - found.by_localisation.column(k);
+            assert!(error.amax() < 2e-3 * found.by_localisation.column(k).amax(), "{k} {error}");
+        }
+        let error = solve(Vector3::zeros(), 1e-3) / 1e-3 - found.by_disparity_offset;
+        assert!(error.amax() < 2e-3 * scale, "{error} {scale}");
+    }
+}
