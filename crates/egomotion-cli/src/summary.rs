@@ -27,6 +27,9 @@ pub struct Summary {
     /// From the first decode to the last motion row, over frames; writing and report excluded.
     pub frame_ms: f64,
     pub wall_s: f64,
+    /// Median over the frames of the vertical disparity of matches, in pixels: 0 if perfectly rectified.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row_disagreement_px: Option<f64>,
     /// Against the source's own truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<MotionVerdict>,
@@ -53,6 +56,10 @@ impl Summary {
             stages_ms: outcome.stages_ms.iter().copied().collect(),
             frame_ms: outcome.frame_ms,
             wall_s: outcome.wall_s,
+            row_disagreement_px: egomotion::metrics::quantile(
+                &outcome.rows.iter().filter_map(|row| row.motion.row_disagreement_px).collect::<Vec<_>>(),
+                0.5,
+            ),
             truth: MotionVerdict::of(outcome),
             truth_maps: None,
         }

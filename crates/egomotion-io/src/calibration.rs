@@ -32,17 +32,7 @@ struct Projection {
 pub struct Calibration {
     path: PathBuf,
     projections: Vec<Projection>,
-    sigma_px: f64,
 }
-
-/// Our own key for how well a rig is calibrated, in pixels of disparity; a rendered one is exact.
-const SIGMA_KEY: &str = "calibration_sigma_px";
-
-/// What is assumed of a recording that does not say how well it is calibrated, in pixels of disparity.
-///
-/// Rectification leaves a few tenths of a pixel on real rigs, and the KITTI sets' laser truth and
-/// stereo disparity differ by about half a pixel.
-const ASSUMED_SIGMA_PX: f64 = 0.5;
 
 impl Calibration {
     /// The projection matrices of a file; see [`Calibration::parse`].
@@ -53,28 +43,15 @@ impl Calibration {
         Self::parse(&read::text(path)?, path)
     }
 
-    /// The projection matrices of a text, and `calibration_sigma_px` if it is there; other keys are
-    /// ignored; `path` names it in errors.
+    /// The projection matrices of a text; other keys are ignored; `path` names it in errors.
     ///
     /// # Errors
     /// Names the line and the key of a matrix that is not 12 finite numbers.
     pub fn parse(text: &str, path: &Path) -> Result<Self, IoError> {
         let mut projections = Vec::new();
-        let mut sigma_px = ASSUMED_SIGMA_PX;
         for (line, content) in read::lines(text) {
             let Some((key, values)) = content.split_once(':') else { continue };
             let key = key.trim();
-            if key == SIGMA_KEY {
-                sigma_px = read::numbers(values).ok().and_then(|v| v.first().copied()).ok_or_else(|| {
-                    IoError::new(
-                        path,
-                        format_args!("{key}: no number"),
-                        "give a standard deviation in pixels",
-                    )
-                    .at_line(line)
-                })?;
-                continue;
-            }
             if !(0..4).any(|camera| names(camera).contains(&key.to_owned())) {
                 continue;
             }
@@ -91,7 +68,7 @@ impl Calibration {
                 values.try_into().map_err(|v: Vec<f64>| refuse(format!("{} numbers, not 12", v.len())))?;
             projections.push(Projection { key: key.into(), line, entries });
         }
-        Ok(Self { path: path.to_owned(), projections, sigma_px })
+        Ok(Self { path: path.to_owned(), projections })
     }
 
     /// The rectified rig of a pair of cameras, for images of `size` (width, height) in pixels.
@@ -119,7 +96,6 @@ impl Calibration {
             baseline_m: (l[3] - r[3]) / l[0],
             width_px: size.0,
             height_px: size.1,
-            calibration_sigma_px: self.sigma_px,
         };
         rig.check().map_err(|error| {
             let (reason, advice) =
@@ -201,15 +177,6 @@ mod tests {
         let rig = rig(&format!("P0: {LEFT}\nP1: {RIGHT}\n")).unwrap();
         assert_eq!((rig.focal_px, rig.focal_y_px, rig.cx_px, rig.cy_px), (700.0, 700.0, 600.0, 180.0));
         assert_eq!((rig.baseline_m, rig.doffs_px, rig.width_px, rig.height_px), (0.5, 3.0, 1242, 375));
-    }
-
-    #[test]
-    fn a_file_may_say_how_good_it_is() {
-        let sigma =
-            |line: &str| rig(&format!("P0: {LEFT}\nP1: {RIGHT}\n{line}")).map(|r| r.calibration_sigma_px);
-        assert_eq!(sigma("calibration_sigma_px: 0\n"), Ok(0.0));
-        assert_eq!(sigma(""), Ok(ASSUMED_SIGMA_PX));
-        assert!(sigma("calibration_sigma_px: -1\n").is_err() && sigma("calibration_sigma_px: x\n").is_err());
     }
 
     #[test]

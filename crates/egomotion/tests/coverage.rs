@@ -415,7 +415,7 @@ fn rigid_depth_velocity() {
         let sigma = 0.02;
         let drawn = disturbed(&motion, &mut rng);
         let measured = Vector3::new(xyd.x, xyd.y, xyd.z + sigma * normals::<1>(&mut rng)[0]);
-        let prediction = vz::RigidPrediction::new(&drawn, &Vector6::zeros(), &rig).unwrap();
+        let prediction = vz::RigidPrediction::new(&drawn, vz::DisparityOffset::none(), &rig).unwrap();
         let got = prediction.depth_velocity(&measured, sigma).unwrap().z_vz;
         let p = rig.point(&xyd).unwrap();
         nees.add(&got, &Vector2::new(p.z, truth.exp().apply(&p).z - p.z));

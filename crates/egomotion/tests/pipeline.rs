@@ -228,6 +228,7 @@ fn answer(
             inliers: 90,
             residual_scale: 1.0,
         }),
+        row_disagreement_px: None,
         impact: None,
         dense: None,
         stages: StageTimes::default(),

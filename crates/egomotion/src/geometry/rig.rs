@@ -32,8 +32,6 @@ pub struct StereoRig {
     pub width_px: usize,
     /// Image height, in pixels.
     pub height_px: usize,
-    /// How well the rig is calibrated: standard deviation of an offset common to all disparities, in pixels.
-    pub calibration_sigma_px: f64,
 }
 
 /// Why a rig cannot measure anything.
@@ -48,16 +46,13 @@ pub enum RigError {
     /// A principal point or offset is not a finite number.
     #[error("principal point is not finite")]
     PrincipalPoint,
-    /// The uncertainty of the calibration is negative or not a number.
-    #[error("calibration sigma {0} px is negative or not a number")]
-    Calibration(f64),
     /// The image has no pixels.
     #[error("image size {0}x{1} is empty")]
     Size(usize, usize),
 }
 
 impl StereoRig {
-    /// A perfectly calibrated rig with square pixels and equal principal points.
+    /// A rig with square pixels and equal principal points.
     ///
     /// # Errors
     /// [`RigError`] when the focal length, the baseline or the size is not positive.
@@ -76,7 +71,6 @@ impl StereoRig {
             baseline_m,
             width_px,
             height_px,
-            calibration_sigma_px: 0.0,
         };
         rig.check().map(|()| rig)
     }
@@ -98,9 +92,6 @@ impl StereoRig {
         }
         if !(self.cx_px.is_finite() && self.cy_px.is_finite() && self.doffs_px.is_finite()) {
             return Err(RigError::PrincipalPoint);
-        }
-        if !(self.calibration_sigma_px.is_finite() && self.calibration_sigma_px >= 0.0) {
-            return Err(RigError::Calibration(self.calibration_sigma_px));
         }
         if self.width_px == 0 || self.height_px == 0 {
             return Err(RigError::Size(self.width_px, self.height_px));

@@ -146,22 +146,37 @@ pub struct RigidPrediction<'a> {
     motion: RigidMotion,
     left_jacobian: nalgebra::Matrix6<f64>,
     cov: nalgebra::Matrix6<f64>,
-    by_disparity_offset: Vector6<f64>,
+    offset: DisparityOffset,
+}
+
+/// An unknown offset common to all disparities: what an imperfect calibration does to the rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DisparityOffset {
+    /// Its standard deviation, in pixels.
+    pub sigma_px: f64,
+    /// How φ changes per pixel of it.
+    pub phi_per_px: Vector6<f64>,
+}
+
+impl DisparityOffset {
+    /// A perfect calibration.
+    pub fn none() -> Self {
+        Self { sigma_px: 0.0, phi_per_px: Vector6::zeros() }
+    }
 }
 
 impl<'a> RigidPrediction<'a> {
     /// Predict with φ ± its covariance; `None` where some component of φ is unknown.
     ///
-    /// `by_disparity_offset` is how φ changes per pixel of an offset common to all disparities: with
-    /// the rig's `calibration_sigma_px` it makes the part of the variance that is calibration's.
-    pub fn new(phi: &Gaussian<6>, by_disparity_offset: &Vector6<f64>, rig: &'a StereoRig) -> Option<Self> {
+    /// The offset makes the part of the variance that is calibration's.
+    pub fn new(phi: &Gaussian<6>, offset: DisparityOffset, rig: &'a StereoRig) -> Option<Self> {
         let twist = Twist::from_vector(&phi.mean);
         phi.cov.iter().all(|v| v.is_finite()).then(|| Self {
             rig,
             motion: twist.exp(),
             left_jacobian: twist.left_jacobian(),
             cov: phi.cov,
-            by_disparity_offset: *by_disparity_offset,
+            offset,
         })
     }
 
@@ -195,8 +210,8 @@ impl<'a> RigidPrediction<'a> {
             vz_by_d * vz_by_d * var + by_phi.dot(&(self.cov * by_phi)),
         );
         // The offset moves φ and this pixel's own disparity together.
-        let by_offset = Vector2::new(by_d.z, by_phi.dot(&self.by_disparity_offset) + vz_by_d)
-            * self.rig.calibration_sigma_px;
+        let by_offset =
+            Vector2::new(by_d.z, by_phi.dot(&self.offset.phi_per_px) + vz_by_d) * self.offset.sigma_px;
         let cov = cov + by_offset * by_offset.transpose();
         Some(DepthVelocity { z_vz: Gaussian { mean: Vector2::new(p.z, moved.z - p.z), cov } })
     }

@@ -6,6 +6,7 @@ pub mod flow;
 pub mod observation;
 pub mod patch;
 pub mod pyramid;
+pub mod row_disagreement;
 pub mod sample;
 pub mod spline;
 pub mod tracks;
