@@ -329,7 +329,7 @@ fn covariance_of_the_rigid_prediction() {
             let motion = Twist::from_vector(&m.fixed_rows::<6>(1).into()).exp();
             Vector2::new(p.z, motion.apply(&p).z - p.z)
         };
-        let prediction = RigidPrediction::new(&motion, DisparityOffset::none(), &rig).unwrap();
+        let prediction = RigidPrediction::new(&motion, vz::DisparityOffset::none(), &rig).unwrap();
         let got = prediction.depth_velocity(&xyd, sigma).unwrap().z_vz;
         assert!((got.mean - of(&raw.mean)).norm() < 1e-12);
         let want: Matrix2<f64> = propagated(of, &raw, 1e-3);

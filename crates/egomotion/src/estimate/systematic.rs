@@ -85,7 +85,10 @@ mod tests {
         (0..120)
             .map(|i| StereoTrack {
                 before: Gaussian::independent((place(i) + d).into(), [0.0, 0.0, 0.02]),
-                after: Gaussian::independent((moved(&place(i)) + bias + d).into(), variances),
+                after: {
+                    let share = (moved(&place(i)) - place(i)).xy().norm().min(1.0);
+                    Gaussian::independent((moved(&place(i)) + share * bias + d).into(), variances)
+                },
             })
             .collect()
     }

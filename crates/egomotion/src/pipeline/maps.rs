@@ -26,6 +26,11 @@ pub struct MotionMaps {
     pub impact_hi: Grid<f32>,
 }
 
+/// Side of the blocks in which dense points make an obstacle, in pixels.
+const DENSE_OBSTACLE_PX: f64 = 32.0;
+/// The same for tracks, which are about thirty pixels apart.
+const SPARSE_OBSTACLE_PX: f64 = 96.0;
+
 /// What one pixel shows.
 struct Pixel {
     velocity: DepthVelocity,
@@ -45,7 +50,7 @@ pub fn motion_maps(
     dt_s: f64,
 ) -> (MotionMaps, Vec<Neighbourhood>) {
     let (width, height) = pair.flow.size();
-    let blocks = Blocks::over(pair.rig, config.block_px);
+    let blocks = Blocks::over(pair.rig, DENSE_OBSTACLE_PX);
     let rows: Vec<Vec<Option<Pixel>>> = (0..height)
         .into_par_iter()
         .map(|v| (0..width).map(|u| pixel_at(pair, rigid, config, (u, v), dt_s)).collect())
@@ -129,8 +134,7 @@ pub fn track_neighbourhoods(
     config: &Config,
     dt_s: f64,
 ) -> Vec<Neighbourhood> {
-    // Tracks are about thirty pixels apart, so a block must be larger to hold several.
-    let blocks = Blocks::over(rig, 3.0 * config.block_px);
+    let blocks = Blocks::over(rig, SPARSE_OBSTACLE_PX);
     let mut seen = vec![Neighbourhood::default(); blocks.count()];
     for track in tracks {
         let xyd = &track.before.mean;
