@@ -87,6 +87,18 @@ fn standing_still_euroc_v101() {
     assert!(r <= 0.02, "median |Ω| is {r}° of {r_deg:?}");
 }
 
+/// The dense way of the same drive, shorter because it is slower: every frame pair is answered.
+#[test]
+fn a_street_kitti_06_dense() {
+    let Some(folder) = data("kitti_odometry") else { return };
+    let out = TempDir::new().unwrap();
+    run(&folder.join("sequences/06"), out.path(), &["--frames", "14"]);
+    let summary: Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["counts"], serde_json::json!({ "ok": 13 }), "{summary}");
+    assert!(summary["truth"]["t_rmse_m"].as_f64().unwrap() <= 0.02, "{}", summary["truth"]);
+}
+
 /// 2σ should hold 95 % of the true depth velocities; 80 % is asked of scenes with moving cars and a truth
 /// that is itself rounded.
 #[test]

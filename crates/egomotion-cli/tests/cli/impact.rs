@@ -35,7 +35,11 @@ fn nearest_block_s(impacts: &[((usize, usize), f64)]) -> Option<f64> {
     for &((u, v), seconds) in impacts {
         blocks.entry((u / 32, v / 32)).or_default().push(seconds);
     }
-    blocks.values().filter(|b| b.len() >= 32 * 32 / 10).filter_map(|b| quantile(b, 0.5)).min_by(f64::total_cmp)
+    blocks
+        .values()
+        .filter(|b| b.len() >= 32 * 32 / 10)
+        .filter_map(|b| quantile(b, 0.5))
+        .min_by(f64::total_cmp)
 }
 
 #[test]

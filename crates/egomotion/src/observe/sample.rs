@@ -66,12 +66,14 @@ impl DensePair<'_> {
         let (x, y) = (before.mean.x + moved.mean.x, before.mean.y + moved.mean.y);
         let (later, gradient) = disparity_at(self.rig, self.after, x, y)?;
         let half = 0.5 * moved.cov;
-        let shared = |d_variance: f64| 0.5 * d_variance.min(half[(0, 0)]);
+        // Along its row a window is located by 1/G_xx, which is less than (G⁻¹)_xx; see `tracks`.
+        let along_row = half.determinant() / half[(1, 1)];
+        let shared = |d_variance: f64| 0.5 * d_variance.min(along_row).max(0.0);
         before.cov = joint(&half, Vector2::new(shared(before.cov[(2, 2)]), 0.0), before.cov[(2, 2)]);
         // d′ is read where flow says, so an error of flow moves it along the map's slope.
         let own = Vector2::new(shared(later.variance()), 0.0);
         let slope = half * gradient;
-        let variance = later.variance() + gradient.dot(&slope) + 2.0 * own.dot(&gradient).max(0.0);
+        let variance = later.variance() + gradient.dot(&slope) + 2.0 * own.dot(&gradient);
         let after =
             Gaussian { mean: Vector3::new(x, y, later.value()), cov: joint(&half, own + slope, variance) };
         Some(StereoTrack { before, after })
@@ -193,4 +195,34 @@ fn disparity_at(rig: &StereoRig, map: &DisparityMap, x: f64, y: f64) -> Option<(
     // Beyond one pixel of disparity per pixel the stencil straddles a depth edge.
     let on_surface = gradient.amax() < 1.0;
     (d > 0.0 && on_surface).then(|| (Gaussian::scalar(d, sigma * sigma), gradient))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Field, Grid};
+
+    #[test]
+    fn covariances_of_a_track_are_positive_where_flow_knows_one_direction_only() {
+        let (width, height) = (12, 10);
+        let plane = |f: fn(usize, usize) -> f32| Field::from_grid(Grid::from_fn(width, height, f));
+        let slanted = DisparityMap {
+            shift: plane(|u, v| 20.0 + 0.3 * u as f32 - 0.5 * v as f32),
+            sigma: plane(|_, _| 0.2),
+        };
+        let mut flow = FlowField::prediction(plane(|_, _| 0.4), plane(|_, _| -0.3));
+        // An edge: along it nothing is known, across it much.
+        flow.cov_uu = Grid::filled(width, height, 0.25);
+        flow.cov_uv = Grid::filled(width, height, 0.2499);
+        flow.cov_vv = Grid::filled(width, height, 0.25);
+        let rig = StereoRig::new(300.0, (5.5, 4.5), 0.1, (width, height)).unwrap();
+        let pair = DensePair { rig: &rig, before: &slanted, after: &slanted, flow: &flow, flow_right: None };
+        let tracks = pair.every(1, DensePair::stereo_track);
+        assert!(tracks.len() > 40);
+        for track in tracks {
+            for end in [track.before, track.after] {
+                assert!(end.cov.cholesky().is_some(), "{}", end.cov);
+            }
+        }
+    }
 }
