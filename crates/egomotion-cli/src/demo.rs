@@ -73,6 +73,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         command: "egomotion demo".into(),
         config: &config,
         rig: &sequence.rig,
+        notes: Vec::new(),
     };
     folder.write_report(&about, &outcome)?;
     print_verdict(&mut stdout, &outcome, &summary, &verdicts, &out)?;

@@ -103,6 +103,8 @@ pub struct About<'a> {
     pub command: String,
     pub config: &'a Config,
     pub rig: &'a StereoRig,
+    /// What the reader should know besides.
+    pub notes: Vec<String>,
 }
 
 impl ResultFolder {
@@ -133,7 +135,7 @@ impl ResultFolder {
             pictures: outcome.album.pictures(),
             stages_ms: outcome.stages_ms.clone(),
             frame_ms: outcome.frame_ms,
-            notes: Vec::new(),
+            notes: about.notes.clone(),
         });
         self.write("report.html", page.as_bytes())
     }

@@ -178,10 +178,32 @@ fn run_sequence(
         command: std::env::args().collect::<Vec<_>>().join(" "),
         config,
         rig: &rig,
+        notes: notes(&summary),
     };
     folder.write_report(&about, &outcome)?;
     Ok(DoneSequence { summary, first_failure })
 }
+
+/// What the report should say besides.
+fn notes(summary: &Summary) -> Vec<String> {
+    let mut notes = Vec::new();
+    if summary.truth.is_some() {
+        notes.push(
+            "The poses that come with a recording have errors of their own, which count against the bands."
+                .into(),
+        );
+    }
+    if let Some(rows) = summary.row_disagreement_px.filter(|&rows| rows > WORRYING_ROWS_PX) {
+        notes.push(format!(
+            "Matches of left and right lie on different rows, by {rows:.2} px: the pair is not well rectified, \
+             and depths are less certain than their noise tells."
+        ));
+    }
+    notes
+}
+
+/// Rows that disagree by more than this show in every depth.
+const WORRYING_ROWS_PX: f64 = 0.25;
 
 /// The frames to use with their times, which increase also when playing backwards.
 fn select<'a>(args: &RunArgs, sequence: &'a Sequence) -> Result<Vec<(&'a FrameFiles, f64)>> {
