@@ -6,7 +6,7 @@
 //! motion is legal because S, never the measurement's covariance alone, is inverted. Robust
 //! weights are those of Student's t on q = eᵀ S⁻¹ e.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector4};
+use nalgebra::{Matrix6, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -14,9 +14,10 @@ use super::alignment::{Form, Moments, PointPair};
 use super::blocks::{self, BlockScore, Blocks};
 use super::lmeds::{random_subsets, trials};
 use super::m_estimator::{LEAST_SCALE2, StudentT};
+use super::measurement::{At, Linearised, Measurement};
 use super::{Estimate, MotionEstimate, Observability, Unsolvable, median};
-use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
-use crate::observe::{StereoFlow, StereoTrack};
+use crate::geometry::{Gaussian, StereoRig, Twist};
+use crate::observe::StereoTrack;
 
 /// How maximum likelihood iterates and weighs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,165 +47,6 @@ impl Default for MaximumLikelihoodOptions {
             seed: 1,
             localisation_bias_px: 0.0015,
         }
-    }
-}
-
-/// The motion about which observations are linearised, with what they share.
-#[derive(Debug, Clone, Copy)]
-pub struct At<'a> {
-    phi: Twist,
-    motion: RigidMotion,
-    left_jacobian: Matrix6<f64>,
-    rig: &'a StereoRig,
-}
-
-impl<'a> At<'a> {
-    /// Linearise about φ.
-    pub fn new(phi: Twist, rig: &'a StereoRig) -> Self {
-        Self { motion: phi.exp(), left_jacobian: phi.left_jacobian(), phi, rig }
-    }
-}
-
-/// Misclosure e of an observation, its covariance S, and −∂e/∂φ.
-#[derive(Debug, Clone, Copy)]
-pub struct Linearised {
-    pub(super) misclosure: Vector3<f64>,
-    pub(super) cov: Matrix3<f64>,
-    pub(super) by_phi: SMatrix<f64, 3, 6>,
-}
-
-impl Linearised {
-    /// S⁻¹; `None` unless S is positive definite, which rounding or a careless caller may break.
-    pub(super) fn weight(&self) -> Option<Matrix3<f64>> {
-        self.cov.cholesky().map(|c| c.inverse())
-    }
-}
-
-/// An observation that maximum likelihood can use.
-pub trait Measurement: Sync {
-    /// Image coordinates (x, y), in pixels, to find the observation's block.
-    fn position(&self) -> (f64, f64);
-    /// First value (x, y, d) of the structure.
-    fn structure(&self) -> Vector3<f64>;
-    /// Linearise about a motion and a structure, and improve the structure; `None` behind the camera.
-    fn linearise(&self, structure: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised>;
-    /// How far the point moves in the left image, in pixels.
-    fn displacement_px(&self) -> f64;
-    /// The same observation with every disparity larger by so many pixels.
-    fn with_disparity_offset(&self, px: f64) -> Self
-    where
-        Self: Sized;
-}
-
-/// How far a structure may move from where it was measured, in standard deviations.
-const MOST_PULL: f64 = 5.0;
-
-/// Factor that holds a structure back when its squared distance from the measured one is `square`.
-///
-/// An inlier is never pulled so far. An outlier would be pulled to where its derivatives are so
-/// large that no robust weight tames them.
-fn restraint(square: f64) -> f64 {
-    if square > MOST_PULL * MOST_PULL { MOST_PULL / square.sqrt() } else { 1.0 }
-}
-
-impl Measurement for StereoTrack {
-    fn position(&self) -> (f64, f64) {
-        (self.before.mean.x, self.before.mean.y)
-    }
-
-    fn structure(&self) -> Vector3<f64> {
-        self.before.mean
-    }
-
-    fn linearise(&self, s: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised> {
-        let moved = at.motion.apply(&at.rig.point(s)?);
-        let by_moved = at.rig.project_jacobian(&moved);
-        let by_structure = by_moved * at.motion.rotation * at.rig.point_jacobian(s);
-        let predicted = at.rig.project(&moved)?;
-        let misclosure = self.after.mean - predicted - by_structure * (self.before.mean - *s);
-        let gain = self.before.cov * by_structure.transpose();
-        let cov = self.after.cov + by_structure * gain;
-        let pull = cov.try_inverse()? * misclosure;
-        let shift = gain * pull;
-        let improved = self.before.mean + shift * restraint(pull.dot(&(by_structure * shift)));
-        // A first guess may be wild; a structure must stay in front of the camera.
-        if improved.z > 0.1 * s.z {
-            *s = improved;
-        }
-        let by_phi = by_moved * RigidMotion::point_jacobian(&moved) * at.left_jacobian;
-        Some(Linearised { misclosure, cov, by_phi })
-    }
-
-    fn displacement_px(&self) -> f64 {
-        (self.after.mean - self.before.mean).xy().norm()
-    }
-
-    fn with_disparity_offset(&self, px: f64) -> Self {
-        let mut shifted = *self;
-        shifted.before.mean.z += px;
-        shifted.after.mean.z += px;
-        shifted
-    }
-}
-
-impl Measurement for StereoFlow {
-    fn position(&self) -> (f64, f64) {
-        (self.x_px, self.y_px)
-    }
-
-    fn structure(&self) -> Vector3<f64> {
-        Vector3::new(self.x_px, self.y_px, self.measured.mean[0])
-    }
-
-    fn linearise(&self, s: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised> {
-        let (x, y, d) = (s.x, s.y, s.z);
-        if d <= 0.0 {
-            return None;
-        }
-        let (f, bf) = (at.rig.focal_px, at.rig.depth_disparity_product());
-        let (t, w) = (&at.phi.t, &at.phi.omega);
-        // (3) for v_x and v_y of the left camera, and disparity's rate Δv = −(d²/(b f)) VZ of (9).
-        let scaled = Vector3::new(f * t.x - x * t.z, f * t.y - y * t.z, -d * t.z) / bf;
-        let turned = Vector3::new(
-            -x * y / f * w.x + (f + x * x / f) * w.y - y * w.z,
-            -(f + y * y / f) * w.x + x * y / f * w.y + x * w.z,
-            -(y * w.x - x * w.y) * d / f,
-        );
-        let predicted = scaled * d + turned;
-        let rate = Vector3::new(0.0, 0.0, scaled.z + turned.z / d);
-        let by_d = scaled + rate;
-        let z = bf / d;
-        let mut by_phi = SMatrix::<f64, 3, 6>::zeros();
-        by_phi.row_mut(0).copy_from_slice(&[f / z, 0.0, -x / z, -x * y / f, f + x * x / f, -y]);
-        by_phi.row_mut(1).copy_from_slice(&[0.0, f / z, -y / z, -(f + y * y / f), x * y / f, x]);
-        by_phi.row_mut(2).copy_from_slice(&[0.0, 0.0, -d / z, -y * d / f, x * d / f, 0.0]);
-        // (d, v_x, v_y, v_x right) → (v_x, v_y, Δv) − prediction's change with d.
-        let measured = &self.measured.mean;
-        let flow = Vector3::new(measured[1], measured[2], measured[1] - measured[3]);
-        let misclosure = flow - predicted - by_d * (measured[0] - d);
-        let pick = SMatrix::<f64, 3, 4>::new(
-            -by_d.x, 1.0, 0.0, 0.0, //
-            -by_d.y, 0.0, 1.0, 0.0, //
-            -by_d.z, 1.0, 0.0, -1.0,
-        );
-        let gain: Vector3<f64> = pick * self.measured.cov * Vector4::x();
-        let cov = pick * self.measured.cov * pick.transpose();
-        let shift = -gain.dot(&(cov.try_inverse()? * misclosure));
-        let improved = measured[0] + shift * restraint(shift * shift / self.measured.cov[(0, 0)]);
-        if improved > 0.1 * d {
-            s.z = improved;
-        }
-        Some(Linearised { misclosure, cov, by_phi })
-    }
-
-    fn displacement_px(&self) -> f64 {
-        self.measured.mean.fixed_rows::<2>(1).norm()
-    }
-
-    fn with_disparity_offset(&self, px: f64) -> Self {
-        let mut shifted = *self;
-        shifted.measured.mean[0] += px;
-        shifted
     }
 }
 

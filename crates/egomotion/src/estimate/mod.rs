@@ -6,6 +6,7 @@ pub mod least_squares;
 pub mod lmeds;
 pub mod m_estimator;
 pub mod maximum_likelihood;
+pub mod measurement;
 pub mod observability;
 pub mod row;
 pub mod systematic;

@@ -8,7 +8,7 @@ use nalgebra::{Matrix6, SMatrix, Vector6};
 
 use super::Observability;
 use super::m_estimator::StudentT;
-use super::maximum_likelihood::{At, Measurement};
+use super::measurement::{At, Measurement};
 use crate::geometry::{StereoRig, Twist};
 
 /// How φ̂ answers to errors common to all observations.

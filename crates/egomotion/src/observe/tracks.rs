@@ -199,6 +199,8 @@ impl Follower<'_> {
     }
 
     /// A start at full resolution from the coarsest level down.
+    ///
+    /// The levels serve as spline coefficients as they are, which only smooths them a little more.
     fn coarse_to_fine(&self, (u, v): (f64, f64)) -> Option<(f64, f64)> {
         let levels = self.before.left.levels().len().min(self.after.left.levels().len());
         let mut flow = (0.0, 0.0);

@@ -1,6 +1,7 @@
 //! From frames to motion: the one place where all steps meet.
 
 pub mod config;
+mod frame_pair;
 pub mod maps;
 pub mod solve;
 pub mod stereo;

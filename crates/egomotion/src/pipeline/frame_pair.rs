@@ -1,0 +1,235 @@
+//! Two frames compared: the paper's list of sections as one way from images to what their motion means.
+
+use std::time::Instant;
+
+use super::config::{Approach, Config, Method, Observe};
+use super::maps::{MotionMaps, motion_maps, track_neighbourhoods};
+use super::solve::{Observed, solve};
+use super::stereo::{StageTimes, Unanswered};
+use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood, robust_start};
+use crate::estimate::systematic::common_errors;
+use crate::estimate::{MotionEstimate, Unsolvable};
+use crate::geometry::{Field, Grid, RigidMotion, StereoRig, Twist};
+use crate::motion::TimeToImpact;
+use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
+use crate::motion::impact::nearest;
+use crate::observe::row_disagreement::row_disagreement;
+use crate::observe::tracks::{Hints, stereo_tracks};
+use crate::observe::{DensePair, DisparityMap, FlowField, Pyramid, StereoPyramid, StereoTrack, dense_flow};
+
+/// Standard deviation of an offset of disparity per pixel by which rows disagree.
+///
+/// Rows show only the vertical part of a wrong calibration; yaw, focal lengths and distortion act
+/// along rows as well. On the four KITTI scenes with laser truth the horizontal offset is 0.6 to 3.1
+/// times the vertical one; this is the cautious end.
+const OFFSET_PER_ROW_DISAGREEMENT: f64 = 3.0;
+
+/// A frame that later ones are matched with.
+#[derive(Debug)]
+pub(super) struct Reference {
+    pub(super) frame: usize,
+    pub(super) time_s: f64,
+    pub(super) images: StereoPyramid,
+    pub(super) disparity: Option<DisparityMap>,
+}
+
+/// Two frames to be compared.
+pub(super) struct FramePair<'a> {
+    pub(super) before: &'a Reference,
+    pub(super) after: &'a Reference,
+    pub(super) rig: &'a StereoRig,
+    pub(super) config: &'a Config,
+    pub(super) mask: Option<&'a Grid<bool>>,
+}
+
+pub(super) struct PairResult {
+    pub(super) motion: Result<MotionEstimate, Unanswered>,
+    pub(super) row_disagreement_px: Option<f64>,
+    pub(super) impact: Option<TimeToImpact>,
+    pub(super) flow: Option<FlowField>,
+    pub(super) maps: Option<MotionMaps>,
+}
+
+impl FramePair<'_> {
+    pub(super) fn dt_s(&self) -> f64 {
+        self.after.time_s - self.before.time_s
+    }
+
+    /// Observe, constrain and estimate; then what the motion means for every pixel.
+    pub(super) fn motion(&self, velocity: Option<&Twist>, stages: &mut StageTimes) -> PairResult {
+        let prior = velocity.map(|v| v.scaled(self.dt_s()));
+        let (tracks, rough) = timed(&mut stages.tracks_ms, || self.tracks(prior.as_ref()));
+        match self.config.observe {
+            Observe::Sparse => self.sparse(&tracks, rough, stages),
+            Observe::Dense => self.dense(&tracks, rough, stages),
+        }
+    }
+
+    /// Corner tracks, twice: the first pass finds the motion that guides the second.
+    fn tracks(&self, prior: Option<&Twist>) -> (Vec<StereoTrack>, Result<Twist, Unsolvable>) {
+        let mut first = self.track(prior);
+        // A wrong prior leaves few tracks; then searching without it finds more.
+        if prior.is_some() && first.len() < self.config.tracks.corners / 4 {
+            let free = self.track(None);
+            if free.len() > first.len() {
+                first = free;
+            }
+        }
+        let first = self.rough(&first, prior);
+        match first {
+            Ok(rough) => {
+                let tracks = self.track(Some(&rough));
+                let refined = self.rough(&tracks, Some(&rough));
+                (tracks, refined)
+            }
+            Err(why) => (Vec::new(), Err(why)),
+        }
+    }
+
+    fn track(&self, motion: Option<&Twist>) -> Vec<StereoTrack> {
+        let shift = self.before.disparity.as_ref().map(|d| &d.shift);
+        let hints = Hints { shift, motion, mask: self.mask };
+        stereo_tracks(&self.before.images, &self.after.images, self.rig, hints, &self.config.tracks)
+    }
+
+    /// The motion of most tracks.
+    fn rough(&self, tracks: &[StereoTrack], prior: Option<&Twist>) -> Result<Twist, Unsolvable> {
+        let own = &self.config.maximum_likelihood;
+        let options = &MaximumLikelihoodOptions { seed: own.seed ^ self.config.seed, ..*own };
+        let start = robust_start(tracks, self.rig, prior, options)?;
+        Ok(maximum_likelihood(tracks, self.rig, &start, None, &options.kernel)?.motion.phi())
+    }
+
+    fn sparse(
+        &self,
+        tracks: &[StereoTrack],
+        rough: Result<Twist, Unsolvable>,
+        stages: &mut StageTimes,
+    ) -> PairResult {
+        let motion = timed(&mut stages.estimate_ms, || {
+            solve(&Observed::Sparse(tracks), self.rig, &rough?, self.config)
+        });
+        let rows = row_disagreement(&self.before.images, tracks, self.rig);
+        let impact = self.rigid(tracks, motion.as_ref().ok(), rows).and_then(|rigid| {
+            nearest(&mut track_neighbourhoods(tracks, &rigid, self.rig, self.config, self.dt_s()))
+        });
+        PairResult {
+            motion: motion.map_err(Unanswered::from),
+            row_disagreement_px: rows,
+            impact,
+            flow: None,
+            maps: None,
+        }
+    }
+
+    fn dense(
+        &self,
+        tracks: &[StereoTrack],
+        rough: Result<Twist, Unsolvable>,
+        stages: &mut StageTimes,
+    ) -> PairResult {
+        let nothing = |why| PairResult {
+            motion: Err(why),
+            row_disagreement_px: None,
+            impact: None,
+            flow: None,
+            maps: None,
+        };
+        let (Some(before), Some(after)) = (&self.before.disparity, &self.after.disparity) else {
+            return nothing(Unanswered::Unsolvable(Unsolvable::FewRows { rows: 0, needed: 6 }));
+        };
+        let differential = self.config.approach == Approach::Differential;
+        let both = differential && matches!(self.config.method, Method::Dv | Method::Joint | Method::Ml);
+        let prediction = rough.as_ref().ok();
+        let (flow, right) = timed(&mut stages.flow_ms, || {
+            let images = (&self.before.images, &self.after.images);
+            let left = self.flow(
+                &images.0.left,
+                &images.1.left,
+                prediction.map(|phi| self.rigid_flow(before, phi, false)),
+            );
+            let right = both.then(|| {
+                self.flow(
+                    &images.0.right,
+                    &images.1.right,
+                    prediction.map(|phi| self.rigid_flow(before, phi, true)),
+                )
+            });
+            (left, right.flatten())
+        });
+        let Some(flow) = flow else {
+            return nothing(Unanswered::Unsolvable(Unsolvable::FewRows { rows: 0, needed: 6 }));
+        };
+        let pair = DensePair { rig: self.rig, before, after, flow: &flow, flow_right: right.as_ref() };
+        let start = rough.unwrap_or_else(|_| Twist::zero());
+        let motion = timed(&mut stages.estimate_ms, || {
+            solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config)
+        });
+        let rows = row_disagreement(&self.before.images, tracks, self.rig);
+        let (maps, mut seen) = timed(&mut stages.maps_ms, || {
+            let rigid = self.rigid(tracks, motion.as_ref().ok(), rows);
+            motion_maps(&pair, rigid.as_ref(), self.config, self.dt_s())
+        });
+        PairResult {
+            motion: motion.map_err(Unanswered::from),
+            row_disagreement_px: rows,
+            impact: nearest(&mut seen),
+            maps: Some(maps),
+            flow: Some(flow),
+        }
+    }
+
+    /// What every pixel would do as part of the still world.
+    fn rigid(
+        &self,
+        tracks: &[StereoTrack],
+        motion: Option<&MotionEstimate>,
+        row_disagreement_px: Option<f64>,
+    ) -> Option<RigidPrediction<'_>> {
+        let motion = motion?;
+        let kernel = &self.config.maximum_likelihood.kernel;
+        let common = common_errors(tracks, self.rig, &motion.phi(), kernel);
+        let offset = common.map_or_else(DisparityOffset::none, |common| DisparityOffset {
+            sigma_px: OFFSET_PER_ROW_DISAGREEMENT * row_disagreement_px.unwrap_or(0.0),
+            phi_per_px: common.by_disparity_offset,
+        });
+        RigidPrediction::new(&motion.theta, offset, self.rig)
+    }
+
+    fn flow(&self, from: &Pyramid, to: &Pyramid, initial: Option<FlowField>) -> Option<FlowField> {
+        dense_flow(from, to, initial.as_ref(), &self.config.flow).ok()
+    }
+
+    /// The flow of the still world under φ, on the pixel grid of the left or the right camera.
+    fn rigid_flow(&self, before: &DisparityMap, phi: &Twist, right: bool) -> FlowField {
+        let (width, height) = before.shift.size();
+        let mut flow = (Field::missing(width, height), Field::missing(width, height));
+        let motion: RigidMotion = phi.exp();
+        for v in 0..height {
+            for u in 0..width {
+                let Some(shift) = before.shift.get(u, v).map(f64::from) else { continue };
+                let d = self.rig.disparity_from_shift(shift);
+                let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
+                let point = self.rig.point(&nalgebra::Vector3::new(x, y, d));
+                let Some(after) = point.and_then(|p| self.rig.project(&motion.apply(&p))) else { continue };
+                let (u_after, v_after) = self.rig.pixel_from_image(after.x, after.y);
+                let (du, dv) = (u_after - u as f64, (v_after - v as f64) as f32);
+                let (at, du) =
+                    if right { ((u as f64 - shift).round(), du - (after.z - d)) } else { (u as f64, du) };
+                if at >= 0.0 && at < width as f64 {
+                    flow.0.set(at as usize, v, Some(du as f32));
+                    flow.1.set(at as usize, v, Some(dv));
+                }
+            }
+        }
+        FlowField::prediction(flow.0, flow.1)
+    }
+}
+
+/// Run a stage and add its time.
+pub(super) fn timed<T>(total_ms: &mut f64, run: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let value = run();
+    *total_ms += start.elapsed().as_secs_f64() * 1e3;
+    value
+}
