@@ -1,12 +1,13 @@
 //! `egomotion run`: a real sequence in, motion out.
 
+use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use anyhow::{Context, Result, anyhow, bail};
 use egomotion::geometry::{Grid, StereoRig};
-use egomotion::pipeline::{Config, Observe};
+use egomotion::pipeline::{Config, Observe, Unanswered};
 use egomotion_io::image;
 use egomotion_io::source::{FrameFiles, Sequence, Source};
 
@@ -35,18 +36,23 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
     let mut complete = true;
     let folder = ResultFolder::create(&out, false)?;
     for scene in &source.sequences {
-        let done = run_sequence(args, &config, scene, &out.join(&scene.name), &stop)
-            .with_context(|| format!("scene {}", scene.name))?;
-        if !args.json {
-            print_result(args, &done.summary, &out.join(&scene.name))?;
-        }
-        complete &= done.summary.complete;
-        scenes.push(SceneEntry {
-            scene: scene.name.clone(),
-            frames: done.summary.frames,
-            counts: done.summary.counts.clone(),
-            truth_maps: done.summary.truth_maps.clone(),
-        });
+        let folder = out.join(&scene.name);
+        let entry = match run_sequence(args, &config, scene, &folder, &stop) {
+            Ok(done) => {
+                if !args.json {
+                    print_result(args, &done.summary, &folder)?;
+                }
+                complete &= done.summary.complete;
+                SceneEntry::done(&scene.name, done.summary)
+            }
+            Err(error) if error.is::<Usage>() => return Err(error),
+            // One scene that cannot be run does not end the others.
+            Err(error) => {
+                terminal::tell(format_args!("scene {}: {error:#}", scene.name));
+                SceneEntry::failed(&scene.name, &error)
+            }
+        };
+        scenes.push(entry);
         if !complete {
             break;
         }
@@ -61,7 +67,7 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
     if args.json {
         writeln!(terminal::stdout(), "{}", serde_json::to_string_pretty(&index)?)?;
     }
-    if complete && index.scenes.iter().all(|scene| !scene.counts.contains_key("ok")) {
+    if complete && !index.scenes.iter().any(|scene| has_answers(&scene.counts)) {
         bail!("{}: no scene gave a motion; see the status in each motion.csv", args.source.display());
     }
     Ok(ending(complete))
@@ -154,7 +160,7 @@ fn run_sequence(
         |k| feed::read(frames[k].0, frames[k].1),
         |row| {
             if let Err(why) = &row.motion.motion
-                && row.motion.frame > 0
+                && *why != Unanswered::First
             {
                 first_failure.get_or_insert_with(|| why.to_string());
             }
@@ -175,13 +181,22 @@ fn run_sequence(
     let about = About {
         title: &sequence.name,
         source: &summary.source,
-        command: std::env::args().collect::<Vec<_>>().join(" "),
+        command: command_line(),
         config,
         rig: &rig,
         notes: notes(&summary),
     };
     folder.write_report(&about, &outcome)?;
     Ok(DoneSequence { summary, first_failure })
+}
+
+/// The command that repeats this run.
+fn command_line() -> String {
+    let word = |word: std::ffi::OsString| {
+        let word = word.to_string_lossy().into_owned();
+        if word.contains(char::is_whitespace) { format!("'{word}'") } else { word }
+    };
+    std::env::args_os().map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// What the report should say besides.
@@ -240,9 +255,13 @@ fn read_mask(path: &Path, rig: &StereoRig) -> Result<Grid<bool>> {
     Ok(Grid::from_fn(w, h, |u, v| mask.at(u, v) > 0.0))
 }
 
+/// Whether any row gives a motion, or part of one.
+fn has_answers(counts: &BTreeMap<&'static str, usize>) -> bool {
+    counts.contains_key("ok") || counts.contains_key("partial")
+}
+
 fn answered(source: &Path, done: &DoneSequence) -> Result<()> {
-    let any = done.summary.counts.contains_key("ok") || done.summary.counts.contains_key("partial");
-    if any || !done.summary.complete {
+    if has_answers(&done.summary.counts) || !done.summary.complete {
         return Ok(());
     }
     let why = done.first_failure.as_deref().unwrap_or("no frame could be compared with an earlier one");

@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::Result;
 use egomotion::geometry::{Grid, Image, RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::stereo::StageTimes;
-use egomotion::pipeline::{Config, FrameMotion, StereoFrame, StereoMotion, Trajectory};
+use egomotion::pipeline::{Config, FrameMotion, StereoFrame, StereoMotion, Trajectory, Unanswered};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::feed::{Fetched, with_frames};
@@ -99,7 +99,7 @@ impl Session<'_> {
                     Err(why) => pipeline.skip(time_s, why),
                 };
                 if let Err(why) = &motion.motion
-                    && motion.frame > 0
+                    && *why != Unanswered::First
                 {
                     self.progress.suspend(|| tell(format_args!("frame {index}: {why}")));
                 }

@@ -82,4 +82,19 @@ pub struct SceneEntry {
     pub counts: BTreeMap<&'static str, usize>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth_maps: Option<MapVerdict>,
+    /// Why the scene could not be run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error: Option<String>,
+}
+
+impl SceneEntry {
+    pub fn done(scene: &str, summary: Summary) -> Self {
+        let Summary { frames, counts, truth_maps, .. } = summary;
+        Self { scene: scene.to_owned(), frames, counts, truth_maps, error: None }
+    }
+
+    pub fn failed(scene: &str, error: &anyhow::Error) -> Self {
+        let error = Some(format!("{error:#}"));
+        Self { scene: scene.to_owned(), frames: 0, counts: BTreeMap::new(), truth_maps: None, error }
+    }
 }

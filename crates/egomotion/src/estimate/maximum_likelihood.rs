@@ -171,7 +171,7 @@ fn sums<M: Measurement>(
 }
 
 /// A robust first scale of q: its median over that of χ²₃, with the structure as measured.
-fn robust_scale2<M: Measurement>(observations: &[M], phi: &Twist, rig: &StereoRig) -> Option<f64> {
+pub(super) fn robust_scale2<M: Measurement>(observations: &[M], phi: &Twist, rig: &StereoRig) -> Option<f64> {
     let at = At::new(*phi, rig);
     let mut squares: Vec<f64> = observations.iter().filter_map(|o| sampson(o, &at)).collect();
     (!squares.is_empty()).then(|| (median(&mut squares) / 2.366).max(LEAST_SCALE2))

@@ -52,6 +52,22 @@ impl MotionEstimate {
         Twist::from_vector(&self.theta.mean)
     }
 
+    /// The estimate with every component unobserved that has no finite variance.
+    ///
+    /// # Errors
+    /// [`Unsolvable::Unobservable`] when none is left.
+    pub fn known(mut self) -> Result<Self, Unsolvable> {
+        for i in 0..6 {
+            self.observed[i] &= self.theta.cov[(i, i)].is_finite();
+            if !self.observed[i] {
+                self.theta.mean[i] = 0.0;
+            }
+        }
+        let any = self.observed.contains(&true);
+        self.theta.cov = blocks::with_unknowns(self.theta.cov, &self.observed);
+        if any { Ok(self) } else { Err(Unsolvable::Unobservable) }
+    }
+
     /// The same motion and covariance seen by a parallel camera centred at `centre`, equation (4).
     pub fn seen_from(&self, centre: &nalgebra::Vector3<f64>) -> Self {
         let matrix = Twist::seen_from_matrix(centre);
@@ -132,5 +148,26 @@ impl<const N: usize> Fit<N> {
             inliers: self.inliers,
             residual_scale: self.residual_scale,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_finite_variance_is_not_known() {
+        let estimate = |variances: [f64; 6]| Estimate {
+            theta: Gaussian::independent([1.0; 6], variances),
+            observed: [true; 6],
+            rows: 10,
+            inliers: 10,
+            residual_scale: 1.0,
+        };
+        let known = estimate([1.0, f64::INFINITY, 1.0, 1.0, f64::NAN, 1.0]).known().unwrap();
+        assert_eq!(known.observed, [true, false, true, true, false, true]);
+        assert_eq!(known.theta.mean.as_slice(), &[1.0, 0.0, 1.0, 1.0, 0.0, 1.0]);
+        assert_eq!(known.theta.cov[(4, 4)], f64::INFINITY);
+        assert_eq!(estimate([f64::INFINITY; 6]).known(), Err(Unsolvable::Unobservable));
     }
 }

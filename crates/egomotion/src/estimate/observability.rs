@@ -59,11 +59,6 @@ impl Observability {
         self.determined().count()
     }
 
-    /// Ratio of the largest to the smallest eigenvalue of the scaled information.
-    pub fn condition(&self) -> f64 {
-        self.eigenvalues.max() / self.eigenvalues.min().max(0.0)
-    }
-
     /// Which of the N unknowns are determined.
     pub fn observed<const N: usize>(&self) -> [bool; N] {
         let kept: Vec<usize> = self.determined().collect();

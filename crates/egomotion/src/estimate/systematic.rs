@@ -8,6 +8,7 @@ use nalgebra::{Matrix6, SMatrix, Vector6};
 
 use super::Observability;
 use super::m_estimator::StudentT;
+use super::maximum_likelihood::robust_scale2;
 use super::measurement::{At, Measurement};
 use crate::geometry::{StereoRig, Twist};
 
@@ -33,7 +34,7 @@ impl CommonErrors {
 /// Step of the numerical derivative by the offset of disparity, in pixels.
 const OFFSET_STEP_PX: f64 = 1e-3;
 
-/// The response of the maximum-likelihood estimate at φ; `None` where some direction is not determined.
+/// The response of the maximum-likelihood estimate at φ, with the structure as measured; `None` where some direction is not determined.
 pub fn common_errors<M: Measurement>(
     observations: &[M],
     rig: &StereoRig,
@@ -41,6 +42,7 @@ pub fn common_errors<M: Measurement>(
     kernel: &StudentT,
 ) -> Option<CommonErrors> {
     let at = At::new(*phi, rig);
+    let scale2 = if kernel.nu.is_infinite() { 1.0 } else { robust_scale2(observations, phi, rig)? };
     let mut information = Matrix6::zeros();
     let mut response = SMatrix::<f64, 6, 4>::zeros();
     for observation in observations {
@@ -48,7 +50,7 @@ pub fn common_errors<M: Measurement>(
         let shifted = observation.with_disparity_offset(OFFSET_STEP_PX);
         let Some(s) = shifted.linearise(&mut shifted.structure(), &at) else { continue };
         let Some(inverse) = l.weight() else { continue };
-        let weight = kernel.weight(l.misclosure.dot(&(inverse * l.misclosure)), 3.0);
+        let weight = kernel.weight(l.misclosure.dot(&(inverse * l.misclosure)) / scale2, 3.0);
         let weighted = weight * l.by_phi.transpose() * inverse;
         information += weighted * l.by_phi;
         let share = observation.displacement_px().min(1.0);

@@ -137,12 +137,6 @@ impl RigidMotion {
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation))
     }
 
-    /// Angle of the rotation, in radians, 0 … π.
-    pub fn angle(&self) -> f64 {
-        let q = self.quaternion();
-        2.0 * q.imag().norm().atan2(q.scalar().abs())
-    }
-
     /// φ with exp(φ) equal to this motion: the constant velocities over one interval, (25)–(28).
     ///
     /// Stable near zero and near π, because the angle is read from a quaternion.

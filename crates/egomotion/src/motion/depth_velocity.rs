@@ -33,6 +33,15 @@ impl DepthVelocity {
         Some(Gaussian::scalar(per_interval.value() / dt_s, per_interval.variance() / (dt_s * dt_s)))
     }
 
+    /// The same with Z at the beginning of the interval, of one that holds Z at its middle.
+    ///
+    /// Differential observations are taken half-way along the motion, Z_mid = Z + VZ/2.
+    pub fn from_middle(self) -> Self {
+        let [z_middle, vz] = self.z_vz.mean.into();
+        let back = Matrix2::new(1.0, -0.5, 0.0, 1.0);
+        Self { z_vz: self.z_vz.propagate(Vector2::new(z_middle - 0.5 * vz, vz), &back) }
+    }
+
     /// From disparity before and after (d, d′) and their joint covariance; `bf` is b f. Needs d, d′ > 0.
     pub fn from_disparities(disparities: &Gaussian<2>, bf: f64) -> Self {
         let [d, after] = disparities.mean.into();
@@ -238,4 +247,23 @@ pub fn rigid_unless_moving(
 /// Smallest change of depth that a disparity step δ shows at disparity d, ΔZ = −Z/(1 + d/δ) in metres, (51).
 pub fn smallest_change(d: f64, step: f64, bf: f64) -> f64 {
     -bf / d / (1.0 + d / step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_to_impact_counts_from_the_later_frame_wherever_z_was_measured() {
+        // 2 m before, 1.9 m at the middle, 1.8 m after: nine more intervals to the camera.
+        let cov = Matrix2::new(4e-4, 1e-4, 1e-4, 9e-4);
+        let middle = DepthVelocity { z_vz: Gaussian { mean: Vector2::new(1.9, -0.2), cov } };
+        let start = DepthVelocity { z_vz: Gaussian { mean: Vector2::new(2.0, -0.2), cov } };
+        for velocity in [middle.from_middle(), start] {
+            assert!((velocity.looming(0.1).unwrap().value() - 1.0 / 0.9).abs() < 1e-12);
+        }
+        // Var(Z − VZ/2) = 4e-4 − 1e-4 + 9e-4/4.
+        assert!((middle.from_middle().z_vz.cov[(0, 0)] - 5.25e-4).abs() < 1e-15);
+        assert_eq!(middle.from_middle().vz(), middle.vz());
+    }
 }

@@ -81,8 +81,8 @@ const LEAST_POINTS: usize = 3;
 /// Least share of a block's points that must cross: a mismatched patch does not fill a block.
 const LEAST_SHARE: f64 = 0.1;
 
-/// The nearest obstacle: of all blocks whose points mostly or partly cross the window (at least
-/// three of them and 10 %), the one whose median looming is largest.
+/// The nearest obstacle: of all blocks of which at least three points and 10 % cross the window,
+/// the one whose median looming is largest.
 ///
 /// Its σ is that of the block's median point, not divided by the number of points, because
 /// neighbours share their noise.

@@ -90,7 +90,7 @@ impl DensePair<'_> {
             y_px: y,
             disparity: Gaussian::independent(
                 [d, after.value(), gradient.x, gradient.y],
-                [var, var_after, 0.5 * var_after, 0.5 * var_after],
+                [var, var_after, 0.5 * var_after, 0.5 * var_after / self.rig.aspect().powi(2)],
             ),
             displacement: self.displacement(u, v)?,
         })
@@ -101,6 +101,8 @@ impl DensePair<'_> {
     /// There the differences of one interval are central ones, so that the error of taking them for
     /// derivatives is of third order in the motion.
     pub fn depth_flow(&self, u: usize, v: usize) -> Option<DepthFlow> {
+        // A pixel without disparity of its own (masked, hidden) is none, whatever lies half-way.
+        self.before.shift.get(u, v)?;
         let flow = self.displacement(u, v)?;
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
         let (x, y) = (x + 0.5 * flow.mean.x, y + 0.5 * flow.mean.y);
@@ -108,25 +110,11 @@ impl DensePair<'_> {
         let (b, slope_b) = disparity_at(self.rig, self.after, x, y)?;
         let slope = 0.5 * (slope_a + slope_b);
         let (sum, difference) = (a.variance() + b.variance(), b.variance() - a.variance());
-        let gradient = 0.5 * 0.25 * sum;
-        let cov = Matrix4::new(
-            0.25 * sum,
-            0.0,
-            0.0,
-            0.5 * difference, //
-            0.0,
-            gradient,
-            0.0,
-            0.0, //
-            0.0,
-            0.0,
-            gradient,
-            0.0, //
-            0.5 * difference,
-            0.0,
-            0.0,
-            sum,
-        );
+        // Central differences of both maps' mean; vertical ones are per image coordinate.
+        let (across, down) = (0.125 * sum, 0.125 * sum / self.rig.aspect().powi(2));
+        let mut cov = Matrix4::from_diagonal(&Vector4::new(0.25 * sum, across, down, sum));
+        cov[(0, 3)] = 0.5 * difference;
+        cov[(3, 0)] = 0.5 * difference;
         let mean = Vector4::new(0.5 * (a.value() + b.value()), slope.x, slope.y, b.value() - a.value());
         Some(DepthFlow { x_px: x, y_px: y, disparity: Gaussian { mean, cov }, flow })
     }

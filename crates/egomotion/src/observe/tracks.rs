@@ -137,6 +137,11 @@ impl Follower<'_> {
         let right = self.across(&patch, self.before, (u, v), shift)?;
         let shift = u - right.u;
         let (next, scale) = self.in_time(&patch, (u, v), shift)?;
+        let (u_next, v_next) = (next.u.round() as usize, next.v.round() as usize);
+        let masked = |m: &Grid<bool>| u_next < m.width() && v_next < m.height() && m.at(u_next, v_next);
+        if self.hints.mask.is_some_and(masked) {
+            return None;
+        }
         let patch_after = Patch::new(&self.after.left_spline, next.u, next.v)?;
         let shift_guess = shift * scale;
         let right_after = self.across(&patch_after, self.after, (next.u, next.v), shift_guess)?;

@@ -178,7 +178,7 @@ impl Config {
             (self.tracks.largest_residual > 0.0, "tracks.largest_residual must be positive"),
             (self.disparity.levels >= 1, "disparity.levels must be at least 1"),
             (self.disparity.refinement_steps >= 1, "disparity.refinement_steps must be at least 1"),
-            (kernels.iter().all(|k| k.nu > 0.0), "nu must be positive"),
+            (kernels.iter().all(|k| k.nu > 0.0 && k.nu.is_finite()), "nu must be positive and finite"),
             (kernels.iter().all(|k| k.iterations >= 1), "iterations must be at least 1"),
             (kernels.iter().all(|k| k.tolerance > 0.0), "tolerance must be positive"),
             (

@@ -180,6 +180,9 @@ impl FramePair<'_> {
     }
 
     /// What every pixel would do as part of the still world.
+    ///
+    /// How φ answers to a wrong calibration is taken from maximum likelihood on the tracks, whatever
+    /// the method that found φ.
     fn rigid(
         &self,
         tracks: &[StereoTrack],

@@ -109,9 +109,11 @@ fn velocity_at(
             Some(depth_velocity::dcce(&pair.depth_track(u, v)?.depth_change(bf)))
         }
         (Method::Dcce, Approach::Differential) => {
-            Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)))
+            Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)).from_middle())
         }
-        (Method::Dv, Approach::Differential) => Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf)),
+        (Method::Dv, Approach::Differential) => {
+            Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf).from_middle())
+        }
         (Method::Dv, Approach::Discrete) => Some(depth_velocity::dv_discrete(&pair.stereo_track(u, v)?, bf)),
         _ => {
             let measured = pair.stereo_track(u, v).map(|track| depth_velocity::dv_discrete(&track, bf));

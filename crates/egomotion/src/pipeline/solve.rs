@@ -34,7 +34,7 @@ pub fn solve(
     config: &Config,
 ) -> Result<MotionEstimate, Unsolvable> {
     let solver = Solver { rig, start, config, blocks: Blocks::over(rig, config.block_px) };
-    match (config.method, config.approach) {
+    let found = match (config.method, config.approach) {
         (Method::Ml, Approach::Discrete) => solver.likelihood(&solver.tracks(observed)),
         (Method::Ml, Approach::Differential) => solver.likelihood(&solver.flows(observed)),
         (Method::Dcce, _) => solver.depth_change(&solver.depth_changes(observed)),
@@ -42,7 +42,8 @@ pub fn solve(
         (Method::Joint, _) => solver.joint(&solver.flows(observed)),
         (Method::Rigid, _) => solver.alignment(&solver.tracks(observed), Form::Rigid),
         (Method::Linear22, _) => solver.alignment(&solver.tracks(observed), Form::Affine),
-    }
+    };
+    found?.known()
 }
 
 struct Solver<'a> {
@@ -110,7 +111,9 @@ impl Solver<'_> {
         let blocks = Some(&self.blocks);
         let mut motion =
             maximum_likelihood(observations, self.rig, self.start, blocks, &options.kernel)?.motion;
-        if let Some(common) = common_errors(observations, self.rig, &motion.phi(), &options.kernel) {
+        if motion.theta.cov.iter().all(|v| v.is_finite())
+            && let Some(common) = common_errors(observations, self.rig, &motion.phi(), &options.kernel)
+        {
             motion.theta.cov += common.localisation_covariance(options.localisation_bias_px);
         }
         Ok(motion)
