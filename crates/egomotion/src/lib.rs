@@ -2,7 +2,7 @@
 //!
 //! The modules follow the way of the data; each imports only from those before it:
 //! [`geometry`], [`observe`], [`constrain`], [`estimate`], [`motion`], [`pipeline`]. Beside them stand [`sim`],
-//! which needs geometry alone, and [`metrics`].
+//! which needs geometry alone, and [`metrics`]; [`study`] looks at all of them.
 //!
 //! Two rendered frames in, the motion of the scene between them out:
 //!
@@ -35,3 +35,4 @@ pub mod motion;
 pub mod observe;
 pub mod pipeline;
 pub mod sim;
+pub mod study;

@@ -14,7 +14,7 @@ const ALLOWED: [(&str, &[&str]); 9] = [
     ("estimate", &["geometry", "observe", "constrain"]),
     ("motion", &["geometry", "observe", "constrain", "estimate"]),
     ("pipeline", &["geometry", "observe", "constrain", "estimate", "motion"]),
-    ("study", &["geometry", "observe", "constrain", "estimate", "motion", "sim", "metrics"]),
+    ("study", &["geometry", "observe", "constrain", "estimate", "motion", "pipeline", "sim", "metrics"]),
     ("sim", &["geometry"]),
     ("metrics", &["geometry"]),
 ];
