@@ -1,6 +1,7 @@
 //! The command `egomotion`.
 
 mod args;
+mod chart;
 mod demo;
 mod evaluate;
 mod feed;
