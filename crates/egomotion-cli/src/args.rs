@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::study::StudyCommand;
 use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
 
 /// 3D motion, depth velocity and time to impact from stereo, each with an uncertainty that can be trusted.
@@ -26,6 +28,11 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     /// Say what a source was recognised as: layout, frames, rig, time stamps, truth.
     Info(InfoArgs),
+    /// Repeat the paper's studies: files with every figure, and one page.
+    Study {
+        #[command(subcommand)]
+        command: StudyCommand,
+    },
 }
 
 #[derive(Debug, Args)]

@@ -11,7 +11,6 @@ mod report;
 mod results;
 mod run;
 mod session;
-#[expect(dead_code, reason = "no study of the library is wired to it yet")]
 mod study;
 mod summary;
 mod terminal;
@@ -49,6 +48,7 @@ fn main() -> ExitCode {
         Command::Run(args) => run::run(args),
         Command::Evaluate(args) => evaluate::evaluate(args),
         Command::Info(args) => info::info(args),
+        Command::Study { command } => study::study(command),
     };
     match ending {
         Ok(Ending::Done) => ExitCode::SUCCESS,

@@ -2,9 +2,28 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 
 use crate::args::positive;
+
+/// The studies.
+#[derive(Debug, Subcommand)]
+pub enum StudyCommand {
+    /// One setting of the synthetic study alone: every method, approach and estimator.
+    Table(TableArgs),
+    /// The six sweeps of section 7.1, at both baselines: Figures 7, 8 and 9.
+    Sensitivity(SensitivityArgs),
+}
+
+/// The six sweeps.
+#[derive(Debug, Clone, Args)]
+pub struct SensitivityArgs {
+    /// The sequences [default: all of them].
+    #[arg(long, value_name = "NAME", ignore_case = true, value_delimiter = ',', value_parser = ["A", "B", "C"])]
+    pub sequence: Vec<String>,
+    #[command(flatten)]
+    pub laboratory: LaboratoryArgs,
+}
 
 /// What all studies take.
 #[derive(Debug, Clone, Args)]
