@@ -1,0 +1,208 @@
+//! Settings drawn at random from the sequences, and what is found at each.
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::exact::{Exact, Instants, Noise, Surface};
+use super::formula::{Family, Inputs, Kind};
+use super::monte_carlo::{Drawn, Noisy, mixed};
+use super::rounding::rounded_variance;
+use super::{LEVELS, STEPS, World};
+use crate::geometry::rounding_variance;
+
+/// Standard deviations of a disparity, in pixels; the last ones reach beyond σ_d/d = .02.
+const DISPARITY_PX: [f64; 6] = [1.0 / 32.0, 1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0, 1.0];
+/// Standard deviations of flow and displacement, in pixels.
+const FLOW_PX: [f64; 5] = [0.0, 1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
+/// Pixels tried before a setting is given up; about half of an image is usable.
+const TRIES: usize = 10_000;
+/// Rounding has heavy tails where few draws leave a level: so many times more draws.
+const ROUNDING_DRAWS: usize = 5;
+/// Normal quantile of 95 %.
+const NORMAL_95: f64 = 1.959_964;
+
+/// One predicted variance beside the one found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Case {
+    /// Which estimator.
+    pub family: Family,
+    /// Which formula: `(39c)`.
+    pub formula: String,
+    /// Printed, corrected, ….
+    pub kind: Kind,
+    /// What was drawn.
+    pub inputs: Inputs,
+    /// What is estimated; variances are in px² where it is a disparity, in mm² elsewhere.
+    pub quantity: String,
+    /// Sequence.
+    pub sequence: String,
+    /// Multiple of its motion.
+    pub step: f64,
+    /// Where and with what noise; `None` over all points of the sequence's view.
+    pub place: Option<Place>,
+    /// Disparity levels per pixel, where disparity is rounded.
+    pub levels: Option<usize>,
+    /// Predicted variance.
+    pub predicted: f64,
+    /// Variance over the draws.
+    pub empirical: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// Draws.
+    pub draws: usize,
+}
+
+/// Place and noise of a case.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// Reference pose exp(k φ).
+    pub pose: i32,
+    /// Pixel (u, v).
+    pub pixel: (usize, usize),
+    /// Depth, in metres.
+    pub depth_m: f64,
+    /// Length of the flow, in pixels per interval.
+    pub flow_px: f64,
+    /// σ_d, in pixels.
+    pub sigma_disparity_px: f64,
+    /// σ_v, in pixels.
+    pub sigma_flow_px: f64,
+    /// σ_d/d.
+    pub relative: f64,
+}
+
+impl Case {
+    /// Empirical over predicted.
+    pub fn ratio(&self) -> f64 {
+        self.empirical / self.predicted
+    }
+
+    /// Its 95 % interval.
+    pub fn interval(&self) -> (f64, f64) {
+        let half = NORMAL_95 * self.standard_error / self.predicted;
+        (self.ratio() - half, self.ratio() + half)
+    }
+
+    /// σ_d/d; 0 over all points, where there is rounding alone.
+    pub fn relative(&self) -> f64 {
+        self.place.map_or(0.0, |place| place.relative)
+    }
+}
+
+/// A point with its noise, drawn at random.
+struct Setting {
+    step: f64,
+    pose: i32,
+    exact: Exact,
+    noise: Noise,
+    levels: usize,
+}
+
+/// The cases of one family in one sequence: `settings` places, poses, steps and noise levels drawn at random.
+pub fn cases(family: Family, world: &World, settings: usize, draws: usize, seed: u64) -> Vec<Case> {
+    let one = |i: usize| {
+        let seed = mixed(&[seed, i as u64]);
+        let setting = draw_setting(family, world, seed);
+        setting.map(|setting| at_setting(family, world, &setting, draws, seed)).unwrap_or_default()
+    };
+    let mut cases: Vec<Case> = (0..settings).into_par_iter().flat_map_iter(one).collect();
+    if family == Family::Rounding {
+        cases.extend(LEVELS.iter().map(|&levels| over_all_points(world, levels, draws, seed)));
+    }
+    cases
+}
+
+fn draw_setting(family: Family, world: &World, seed: u64) -> Option<Setting> {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    let mut pick = |from: &[f64]| from[rng.random_range(0..from.len())];
+    let (step, disparity_px, flow_px) = (pick(&STEPS), pick(&DISPARITY_PX), pick(&FLOW_PX));
+    let (mut levels, pose) = (LEVELS[rng.random_range(0..LEVELS.len())], rng.random_range(-2..=2));
+    if family == Family::Rounding {
+        // Finer levels where the noise is less than a quarter of one, or hardly a draw leaves its level.
+        while disparity_px * (levels as f64) < 0.25 {
+            levels *= 2;
+        }
+    }
+    let instants = Instants::new(&world.scene, &world.rig, &world.phi, pose, step);
+    let (width, height) = (world.rig.width_px, world.rig.height_px);
+    let mut pixel = || (rng.random_range(0..width), rng.random_range(0..height));
+    let exact = (0..TRIES).find_map(|_| {
+        let (u, v) = pixel();
+        instants.at(u, v, Surface::One)
+    })?;
+    Some(Setting { step, pose, exact, noise: Noise { disparity_px, flow_px }, levels })
+}
+
+fn at_setting(family: Family, world: &World, at: &Setting, draws: usize, seed: u64) -> Vec<Case> {
+    let place = Place {
+        pose: at.pose,
+        pixel: at.exact.pixel,
+        depth_m: at.exact.depth_m,
+        flow_px: at.exact.flow[0].hypot(at.exact.flow[1]),
+        sigma_disparity_px: at.noise.disparity_px,
+        sigma_flow_px: at.noise.flow_px,
+        relative: at.noise.disparity_px / at.exact.now.centre,
+    };
+    let case = |quantity: &str, inputs, (formula, kind, predicted): (&str, Kind, f64), drawn: &Drawn| Case {
+        family,
+        formula: formula.to_owned(),
+        kind,
+        inputs,
+        quantity: quantity.to_owned(),
+        sequence: world.name.clone(),
+        step: at.step,
+        place: Some(place),
+        levels: (family == Family::Rounding).then_some(at.levels),
+        predicted,
+        empirical: drawn.variance,
+        standard_error: drawn.standard_error,
+        draws: drawn.draws,
+    };
+    if family == Family::Rounding {
+        let (d, sigma, levels) = (at.exact.now.centre, at.noise.disparity_px, at.levels as f64);
+        let rounded = move |x: &[f64]| x.iter().map(|d| (d * levels + 0.5).floor() / levels).sum();
+        let drawn = Noisy::new([(d, sigma)], rounded).drawn(ROUNDING_DRAWS * draws, seed);
+        let printed = ("(52)", Kind::Printed, sigma * sigma + rounding_variance(1.0 / levels));
+        let corrected = ("(52c)", Kind::Corrected, rounded_variance(d, sigma, 1.0 / levels));
+        return [printed, corrected].map(|p| case("d", Inputs::Raw, p, &drawn)).into();
+    }
+    let experiments = family.experiments(&at.exact, &at.noise, world.rig.depth_disparity_product());
+    let numbered = (0..).zip(&experiments);
+    let all = numbered.flat_map(|(k, experiment)| {
+        let drawn = experiment.noisy.drawn(draws, mixed(&[seed, k]));
+        let (quantity, inputs) = (experiment.quantity, experiment.inputs);
+        experiment.predictions.iter().map(move |&p| (quantity, inputs, p, drawn))
+    });
+    all.map(|(quantity, inputs, p, drawn)| case(quantity, inputs, p, &drawn)).collect()
+}
+
+/// The error of rounding alone, over random places of the image at the first pose.
+fn over_all_points(world: &World, levels: usize, draws: usize, seed: u64) -> Case {
+    let instants = Instants::new(&world.scene, &world.rig, &world.phi, 0, 1.0);
+    let (view, n) = (instants.now(), levels as f64);
+    let (width, height) = (world.rig.width_px as f64 - 1.0, world.rig.height_px as f64 - 1.0);
+    let error = |i: usize| {
+        let mut rng = Pcg64Mcg::seed_from_u64(mixed(&[seed, levels as u64, i as u64]));
+        let d = view.truth_at(width * rng.random::<f64>(), height * rng.random::<f64>())?.disparity_px();
+        Some((d * n + 0.5).floor() / n - d)
+    };
+    let errors: Vec<f64> = (0..draws).into_par_iter().filter_map(error).collect();
+    let drawn = Drawn::of(&errors);
+    Case {
+        family: Family::Rounding,
+        formula: "(52)".to_owned(),
+        kind: Kind::Printed,
+        inputs: Inputs::Raw,
+        quantity: "d, over the view".to_owned(),
+        sequence: world.name.clone(),
+        step: 1.0,
+        place: None,
+        levels: Some(levels),
+        predicted: rounding_variance(1.0 / n),
+        empirical: drawn.variance,
+        standard_error: drawn.standard_error,
+        draws: drawn.draws,
+    }
+}
