@@ -5,6 +5,7 @@
 
 pub mod figure;
 pub mod table;
+pub mod world;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
