@@ -5,6 +5,7 @@
 
 pub mod figure;
 pub mod table;
+pub mod uncertainty;
 pub mod world;
 
 use serde::Serialize;

@@ -1,18 +1,11 @@
 //! What both approaches measure at one pixel of the synthetic world, without noise.
 
-use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
-use crate::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
-use crate::sim::sequences::reference_pose;
-use crate::sim::{PointTruth, Scene, View};
+use nalgebra::Vector3;
 
-/// A scene before, at and after a reference pose: t − 1, t and t + 1, which is t′ of the discrete form.
-#[derive(Debug, Clone, Copy)]
-pub struct Instants<'a> {
-    before: View<'a>,
-    now: View<'a>,
-    after: View<'a>,
-    phi_left: Twist,
-}
+use crate::geometry::Gaussian;
+use crate::geometry::perspective::image_flow;
+use crate::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
+use crate::study::world::{When, World};
 
 /// Disparity at a pixel and at its four neighbours, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,15 +56,6 @@ pub struct Noise {
     pub flow_px: f64,
 }
 
-/// Which pixels count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Surface {
-    /// The five pixels on one surface, the same at all three times, visible to both cameras.
-    One,
-    /// Every pixel that sees something: what a program does that does not know the edges.
-    Any,
-}
-
 impl Noise {
     /// Variances (σ²_d, σ²_v), in pixels².
     pub fn variances(&self) -> (f64, f64) {
@@ -79,68 +63,19 @@ impl Noise {
     }
 }
 
-impl<'a> Instants<'a> {
-    /// The pose exp(k φ), and the motion `step` φ from and to it; φ is the cyclopean camera's.
-    pub fn new(scene: &'a Scene, rig: &'a StereoRig, phi: &Twist, k: i32, step: f64) -> Self {
-        let (pose, motion) = (reference_pose(phi, k), phi.scaled(step));
-        let view = |pose: RigidMotion| View::new(scene, rig, pose);
-        Self {
-            before: view(pose.after(&motion.exp())),
-            now: view(pose),
-            after: view(pose.after(&motion.exp().inverse())),
-            phi_left: motion.seen_from(&rig.left_from_cyclopean()),
-        }
-    }
-
-    /// The view at t.
-    pub fn now(&self) -> &View<'a> {
-        &self.now
-    }
-
-    /// The exact measurements at the pixel (u, v); `None` where a stencil leaves the image or `surface`.
-    pub fn at(&self, u: usize, v: usize, surface: Surface) -> Option<Exact> {
-        let rig = self.now.rig;
-        if u == 0 || v == 0 || u + 1 >= rig.width_px || v + 1 >= rig.height_px {
-            return None;
-        }
-        let (u_px, v_px) = (u as f64, v as f64);
-        let centre = self.now.truth_at(u_px, v_px)?;
-        let motion = self.now.motion_at(&centre, &self.phi_left);
-        if surface == Surface::One && !motion.in_later {
-            return None;
-        }
-        let wanted = (surface == Surface::One).then_some(centre.surface);
-        let [before, now, after] = [self.before, self.now, self.after].map(|v| stencil(&v, u_px, v_px, wanted));
-        Some(Exact {
-            pixel: (u, v),
-            image_px: (centre.xyd.x, centre.xyd.y),
-            depth_m: centre.depth_m(),
-            before: before?.centre,
-            now: now?,
-            after: after?,
-            flow: motion.flow_left.into(),
-            flow_right_x: motion.flow_right.x,
-            displacement: motion.displacement_px(&centre)?.into(),
-            moved: motion.later_xyd?.z,
+impl Stencil {
+    /// Around the row-major `index` of a plane; `None` past its end or where something is missing.
+    fn of(plane: &[f64], index: usize, width: usize) -> Option<Self> {
+        let at = |i: Option<usize>| plane.get(i?).copied().filter(|d| d.is_finite());
+        Some(Self {
+            centre: at(Some(index))?,
+            left: at(index.checked_sub(1))?,
+            right: at(index.checked_add(1))?,
+            above: at(index.checked_sub(width))?,
+            below: at(index.checked_add(width))?,
         })
     }
-}
 
-fn stencil(view: &View<'_>, u: f64, v: f64, surface: Option<u16>) -> Option<Stencil> {
-    let seen = |p: &PointTruth| surface.is_none_or(|surface| surface == p.surface && p.in_right);
-    let disparity = |du: f64, dv: f64| {
-        view.truth_at(u + du, v + dv).filter(seen).map(|point| point.disparity_px())
-    };
-    Some(Stencil {
-        centre: disparity(0.0, 0.0)?,
-        left: disparity(-1.0, 0.0)?,
-        right: disparity(1.0, 0.0)?,
-        above: disparity(0.0, -1.0)?,
-        below: disparity(0.0, 1.0)?,
-    })
-}
-
-impl Stencil {
     /// Central differences (d_x, d_y), in pixels per pixel.
     pub fn gradient(&self) -> [f64; 2] {
         [0.5 * (self.right - self.left), 0.5 * (self.below - self.above)]
@@ -148,6 +83,36 @@ impl Stencil {
 }
 
 impl Exact {
+    /// The measurements at the pixel with row-major `index`, usable or not; `None` at the image's border,
+    /// and where nothing is seen.
+    pub fn at(world: &World, index: usize) -> Option<Self> {
+        let (rig, phi) = (&world.rig, &world.phi);
+        let (u, v) = (index % rig.width_px, index / rig.width_px);
+        if u == 0 || u + 1 == rig.width_px {
+            return None;
+        }
+        let at = |when| Stencil::of(world.disparity(when), index, rig.width_px);
+        let (before, now, after) = (at(When::Before)?, at(When::Now)?, at(When::After)?);
+        let (x, y) = rig.image_from_pixel(u as f64, v as f64);
+        let xyd = Vector3::new(x, y, now.centre);
+        let point = rig.point(&xyd)?;
+        let shift = rig.project(&phi.exp().apply(&point))? - xyd;
+        let baseline = Vector3::new(rig.baseline_m, 0.0, 0.0);
+        let right = image_flow(&phi.seen_from(&baseline), x - now.centre, y, point.z, rig.focal_px);
+        Some(Self {
+            pixel: (u, v),
+            image_px: (x, y),
+            depth_m: point.z,
+            before: before.centre,
+            now,
+            after,
+            flow: image_flow(phi, x, y, point.z, rig.focal_px).into(),
+            flow_right_x: right.x,
+            displacement: [shift.x, shift.y],
+            moved: now.centre + shift.z,
+        })
+    }
+
     /// What the differential DCCE measures: central differences, so σ²_di = ½ σ²_d.
     pub fn depth_flow(&self, noise: &Noise) -> DepthFlow {
         let (d, v) = noise.variances();
@@ -156,10 +121,7 @@ impl Exact {
         DepthFlow {
             x_px: self.image_px.0,
             y_px: self.image_px.1,
-            disparity: Gaussian::independent(
-                [self.now.centre, dx, dy, dt],
-                [d, 0.5 * d, 0.5 * d, 0.5 * d],
-            ),
+            disparity: Gaussian::independent([self.now.centre, dx, dy, dt], [d, 0.5 * d, 0.5 * d, 0.5 * d]),
             flow: Gaussian::independent(self.flow, [v, v]),
         }
     }

@@ -90,6 +90,11 @@ impl Family {
         }
     }
 
+    /// Whether it needs one surface at t − 1 too.
+    pub fn differential(self) -> bool {
+        matches!(self, Self::Gradient | Self::DcceDifferential | Self::DvDifferential)
+    }
+
     /// Its experiments at one point; none for [`Family::Rounding`], which rounds and so has no derivatives.
     pub fn experiments(self, at: &Exact, noise: &Noise, bf: f64) -> Vec<Experiment> {
         match self {
@@ -97,7 +102,9 @@ impl Family {
             Self::Gradient => gradients(at, noise, bf),
             Self::DcceDifferential => vec![dcce_differential(at, noise, bf), dcce_independent(at, noise, bf)],
             Self::DvDifferential => vec![dv_differential(at, noise, bf)],
-            Self::DcceDiscrete => vec![dcce_discrete(at, noise, bf), dcce_discrete_independent(at, noise, bf)],
+            Self::DcceDiscrete => {
+                vec![dcce_discrete(at, noise, bf), dcce_discrete_independent(at, noise, bf)]
+            }
             Self::DvDiscrete => vec![dv_discrete(at, noise, bf), dv_discrete_independent(at, noise, bf)],
             Self::Rounding => Vec::new(),
         }
@@ -149,9 +156,20 @@ fn exact<const N: usize>(mean: [f64; N]) -> Gaussian<N> {
 
 fn depth(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
     let variance = vz::dv(&at.stereo_flow(noise), bf).z_vz.cov[(0, 0)];
-    let estimate = move |x: &[f64]| vz::dv(&StereoFlow { x_px: 0.0, y_px: 0.0, measured: exact([input(x, 0), 0.0, 0.0, 0.0]) }, bf).z_vz.mean.x;
+    let estimate = move |x: &[f64]| {
+        vz::dv(&StereoFlow { x_px: 0.0, y_px: 0.0, measured: exact([input(x, 0), 0.0, 0.0, 0.0]) }, bf)
+            .z_vz
+            .mean
+            .x
+    };
     let values = with([at.now.centre], noise.disparity_px);
-    experiment("Z", Inputs::Raw, values, estimate, &[("(32)", Kind::Printed, variance), ("(32)", Kind::Corrected, variance)])
+    experiment(
+        "Z",
+        Inputs::Raw,
+        values,
+        estimate,
+        &[("(32)", Kind::Printed, variance), ("(32)", Kind::Corrected, variance)],
+    )
 }
 
 /// The change of depth that nine raw inputs give: five disparities at t, two around it in time, flow.
@@ -221,13 +239,19 @@ fn dcce_independent(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
 
 fn dv_differential(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
     let variance = vz::dv(&at.stereo_flow(noise), bf).vz().variance();
-    let values = with([at.now.centre], noise.disparity_px)
-        .chain(with([at.flow[0], at.flow_right_x], noise.flow_px));
+    let values =
+        with([at.now.centre], noise.disparity_px).chain(with([at.flow[0], at.flow_right_x], noise.flow_px));
     let estimate = move |x: &[f64]| {
         let measured = exact([input(x, 0), input(x, 1), 0.0, input(x, 2)]);
         vz::dv(&StereoFlow { x_px: 0.0, y_px: 0.0, measured }, bf).vz().value()
     };
-    experiment("VZ", Inputs::Raw, values, estimate, &[("(44)", Kind::Printed, variance), ("(44)", Kind::Corrected, variance)])
+    experiment(
+        "VZ",
+        Inputs::Raw,
+        values,
+        estimate,
+        &[("(44)", Kind::Printed, variance), ("(44)", Kind::Corrected, variance)],
+    )
 }
 
 fn dcce_discrete(at: &Exact, noise: &Noise, bf: f64) -> Experiment {

@@ -107,8 +107,10 @@ impl Drawn {
     /// From the sums of the first four powers of the deviations, chunk by chunk.
     fn from_powers(chunks: &[[f64; 4]], draws: usize) -> Self {
         let n = draws as f64;
-        let [m1, m2, m3, m4] =
-            chunks.iter().fold([0.0; 4], |sum, chunk| std::array::from_fn(|k| sum[k] + chunk[k])).map(|s| s / n);
+        let [m1, m2, m3, m4] = chunks
+            .iter()
+            .fold([0.0; 4], |sum, chunk| std::array::from_fn(|k| sum[k] + chunk[k]))
+            .map(|s| s / n);
         let variance = m2 - m1 * m1;
         let fourth = m4 - 4.0 * m1 * m3 + 6.0 * m1 * m1 * m2 - 3.0 * m1.powi(4);
         Self { variance, standard_error: ((fourth - variance * variance).max(0.0) / n).sqrt(), draws }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::geometry::rounding_variance;
+use crate::geometry::gaussian::rounding_variance;
 
 /// Exact variance of d + noise rounded to a multiple of `step`, for Gaussian noise of `sigma`; all in pixels.
 ///
@@ -41,9 +41,13 @@ mod tests {
     #[test]
     fn against_draws() {
         for (d, sigma) in [(10.03, 0.07), (10.125, 0.07), (9.99, 0.2), (12.2, 0.05), (7.125, 0.01)] {
-            let drawn = Noisy::new([(d, sigma)], |x: &[f64]| (4.0 * x[0] + 0.5).floor() / 4.0).drawn(100_000, 3);
+            let drawn =
+                Noisy::new([(d, sigma)], |x: &[f64]| (4.0 * x[0] + 0.5).floor() / 4.0).drawn(100_000, 3);
             let exact = rounded_variance(d, sigma, 0.25);
-            assert!((drawn.variance - exact).abs() < 5.0 * drawn.standard_error, "{d} {sigma} {exact} {drawn:?}");
+            assert!(
+                (drawn.variance - exact).abs() < 5.0 * drawn.standard_error,
+                "{d} {sigma} {exact} {drawn:?}"
+            );
         }
     }
 

@@ -5,19 +5,20 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::exact::{Exact, Instants, Noise, Surface};
+use super::exact::{Exact, Noise};
 use super::formula::{Family, Inputs, Kind};
 use super::monte_carlo::{Drawn, Noisy, mixed};
 use super::rounding::rounded_variance;
-use super::{LEVELS, STEPS, World};
-use crate::geometry::rounding_variance;
+use super::{LEVELS, STEPS};
+use crate::geometry::Twist;
+use crate::geometry::gaussian::rounding_variance;
+use crate::sim::{Sequence, View, reference_pose};
+use crate::study::world::World;
 
 /// Standard deviations of a disparity, in pixels; the last ones reach beyond σ_d/d = .02.
 const DISPARITY_PX: [f64; 6] = [1.0 / 32.0, 1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0, 1.0];
 /// Standard deviations of flow and displacement, in pixels.
 const FLOW_PX: [f64; 5] = [0.0, 1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
-/// Pixels tried before a setting is given up; about half of an image is usable.
-const TRIES: usize = 10_000;
 /// Rounding has heavy tails where few draws leave a level: so many times more draws.
 const ROUNDING_DRAWS: usize = 5;
 /// Normal quantile of 95 %.
@@ -92,7 +93,8 @@ impl Case {
 }
 
 /// A point with its noise, drawn at random.
-struct Setting {
+struct Setting<'a> {
+    sequence: &'a Sequence,
     step: f64,
     pose: i32,
     exact: Exact,
@@ -100,42 +102,54 @@ struct Setting {
     levels: usize,
 }
 
-/// The cases of one family in one sequence: `settings` places, poses, steps and noise levels drawn at random.
-pub fn cases(family: Family, world: &World, settings: usize, draws: usize, seed: u64) -> Vec<Case> {
-    let one = |i: usize| {
-        let seed = mixed(&[seed, i as u64]);
-        let setting = draw_setting(family, world, seed);
-        setting.map(|setting| at_setting(family, world, &setting, draws, seed)).unwrap_or_default()
+/// The cases of one family in one sequence: places, poses and noise drawn at random, `settings` of them
+/// for each multiple of the motion, and every usable pixel as likely as another.
+pub fn cases(family: Family, sequence: &Sequence, settings: usize, draws: usize, seed: u64) -> Vec<Case> {
+    let Some(phi) = sequence.phi_cyclopean(0) else { return Vec::new() };
+    let of_step = |(i, &step): (u64, &f64)| {
+        let mut rng = Pcg64Mcg::seed_from_u64(mixed(&[seed, i]));
+        let pose = rng.random_range(-2..=2);
+        let world = World::new(&sequence.scene, &sequence.rig, &phi, pose, step);
+        let drawn = draw_settings(family, &world, settings, &mut rng);
+        let one = |(k, (exact, noise, levels)): (u64, &(Exact, Noise, usize))| {
+            let at = Setting { sequence, step, pose, exact: *exact, noise: *noise, levels: *levels };
+            at_setting(family, &at, draws, mixed(&[seed, i, k]))
+        };
+        (0..).zip(&drawn).flat_map(one).collect::<Vec<_>>()
     };
-    let mut cases: Vec<Case> = (0..settings).into_par_iter().flat_map_iter(one).collect();
+    let mut cases: Vec<Case> = (0..).zip(&STEPS).flat_map(of_step).collect();
     if family == Family::Rounding {
-        cases.extend(LEVELS.iter().map(|&levels| over_all_points(world, levels, draws, seed)));
+        cases.extend(LEVELS.iter().map(|&levels| over_all_points(sequence, &phi, levels, draws, seed)));
     }
     cases
 }
 
-fn draw_setting(family: Family, world: &World, seed: u64) -> Option<Setting> {
-    let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    let mut pick = |from: &[f64]| from[rng.random_range(0..from.len())];
-    let (step, disparity_px, flow_px) = (pick(&STEPS), pick(&DISPARITY_PX), pick(&FLOW_PX));
-    let (mut levels, pose) = (LEVELS[rng.random_range(0..LEVELS.len())], rng.random_range(-2..=2));
-    if family == Family::Rounding {
-        // Finer levels where the noise is less than a quarter of one, or hardly a draw leaves its level.
-        while disparity_px * (levels as f64) < 0.25 {
+fn draw_settings(
+    family: Family,
+    world: &World,
+    settings: usize,
+    rng: &mut Pcg64Mcg,
+) -> Vec<(Exact, Noise, usize)> {
+    let pixels: Vec<usize> =
+        world.pixels().iter().filter(|p| p.differential || !family.differential()).map(|p| p.index).collect();
+    let mut one = || {
+        let index = pick(&pixels, rng)?;
+        let noise = Noise { disparity_px: pick(&DISPARITY_PX, rng)?, flow_px: pick(&FLOW_PX, rng)? };
+        // Levels no coarser than four times the noise: else hardly a draw leaves its level.
+        let mut levels = pick(&LEVELS, rng)?;
+        while noise.disparity_px * (levels as f64) < 0.25 {
             levels *= 2;
         }
-    }
-    let instants = Instants::new(&world.scene, &world.rig, &world.phi, pose, step);
-    let (width, height) = (world.rig.width_px, world.rig.height_px);
-    let mut pixel = || (rng.random_range(0..width), rng.random_range(0..height));
-    let exact = (0..TRIES).find_map(|_| {
-        let (u, v) = pixel();
-        instants.at(u, v, Surface::One)
-    })?;
-    Some(Setting { step, pose, exact, noise: Noise { disparity_px, flow_px }, levels })
+        Some((Exact::at(world, index)?, noise, levels))
+    };
+    (0..settings).filter_map(|_| one()).collect()
 }
 
-fn at_setting(family: Family, world: &World, at: &Setting, draws: usize, seed: u64) -> Vec<Case> {
+fn pick<T: Copy>(from: &[T], rng: &mut Pcg64Mcg) -> Option<T> {
+    from.get(rng.random_range(0..from.len().max(1))).copied()
+}
+
+fn at_setting(family: Family, at: &Setting<'_>, draws: usize, seed: u64) -> Vec<Case> {
     let place = Place {
         pose: at.pose,
         pixel: at.exact.pixel,
@@ -151,7 +165,7 @@ fn at_setting(family: Family, world: &World, at: &Setting, draws: usize, seed: u
         kind,
         inputs,
         quantity: quantity.to_owned(),
-        sequence: world.name.clone(),
+        sequence: at.sequence.name.clone(),
         step: at.step,
         place: Some(place),
         levels: (family == Family::Rounding).then_some(at.levels),
@@ -168,7 +182,7 @@ fn at_setting(family: Family, world: &World, at: &Setting, draws: usize, seed: u
         let corrected = ("(52c)", Kind::Corrected, rounded_variance(d, sigma, 1.0 / levels));
         return [printed, corrected].map(|p| case("d", Inputs::Raw, p, &drawn)).into();
     }
-    let experiments = family.experiments(&at.exact, &at.noise, world.rig.depth_disparity_product());
+    let experiments = family.experiments(&at.exact, &at.noise, at.sequence.rig.depth_disparity_product());
     let numbered = (0..).zip(&experiments);
     let all = numbered.flat_map(|(k, experiment)| {
         let drawn = experiment.noisy.drawn(draws, mixed(&[seed, k]));
@@ -178,14 +192,15 @@ fn at_setting(family: Family, world: &World, at: &Setting, draws: usize, seed: u
     all.map(|(quantity, inputs, p, drawn)| case(quantity, inputs, p, &drawn)).collect()
 }
 
-/// The error of rounding alone, over random places of the image at the first pose.
-fn over_all_points(world: &World, levels: usize, draws: usize, seed: u64) -> Case {
-    let instants = Instants::new(&world.scene, &world.rig, &world.phi, 0, 1.0);
-    let (view, n) = (instants.now(), levels as f64);
-    let (width, height) = (world.rig.width_px as f64 - 1.0, world.rig.height_px as f64 - 1.0);
+/// The error of rounding alone, over random places of the image from the pose exp(φ).
+fn over_all_points(sequence: &Sequence, phi: &Twist, levels: usize, draws: usize, seed: u64) -> Case {
+    let view = View::new(&sequence.scene, &sequence.rig, reference_pose(phi, 1));
+    let (width, height) = (sequence.rig.width_px as f64 - 1.0, sequence.rig.height_px as f64 - 1.0);
+    let n = levels as f64;
     let error = |i: usize| {
         let mut rng = Pcg64Mcg::seed_from_u64(mixed(&[seed, levels as u64, i as u64]));
-        let d = view.truth_at(width * rng.random::<f64>(), height * rng.random::<f64>())?.disparity_px();
+        let (u, v) = (width * rng.random::<f64>(), height * rng.random::<f64>());
+        let d = view.structure_at(u, v)?.0.z;
         Some((d * n + 0.5).floor() / n - d)
     };
     let errors: Vec<f64> = (0..draws).into_par_iter().filter_map(error).collect();
@@ -196,7 +211,7 @@ fn over_all_points(world: &World, levels: usize, draws: usize, seed: u64) -> Cas
         kind: Kind::Printed,
         inputs: Inputs::Raw,
         quantity: "d, over the view".to_owned(),
-        sequence: world.name.clone(),
+        sequence: sequence.name.clone(),
         step: 1.0,
         place: None,
         levels: Some(levels),
