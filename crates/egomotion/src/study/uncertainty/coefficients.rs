@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::STEPS;
 use super::exact::{Exact, Noise};
 use crate::motion::depth_velocity as vz;
 use crate::sim::{Part, Scene, Sequence, Shape};
@@ -46,11 +47,26 @@ impl Variances {
     }
 }
 
-/// Coefficients of (53), means over the sphere, with its centre at one depth; in mm² per px².
+/// What changes along a series of coefficients.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Swept {
+    /// The sphere's depth, at the sequence's own motion.
+    Depth,
+    /// The multiple of the motion, with the sphere at its nearest.
+    Step,
+}
+
+/// Coefficients of (53), means over the sphere; in mm² per px².
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Coefficients {
+    /// Which series it belongs to.
+    pub swept: Swept,
+    /// Multiple of the motion.
+    pub step: f64,
     /// Depth of the sphere's centre, in metres.
     pub depth_m: f64,
+    /// Mean depth of the usable pixels on it, in metres.
+    pub mean_depth_m: f64,
     /// Usable pixels on the sphere.
     pub pixels: usize,
     /// As printed: (Coef_disp, Coef_vel) of the four methods.
@@ -59,18 +75,27 @@ pub struct Coefficients {
     pub corrected: [(f64, f64); 4],
 }
 
+/// Depths of the sphere's centre, in metres: the nearest, and the distance between two.
+const NEAR_M: f64 = 2.5;
+const DEPTH_STEP_M: f64 = 0.25;
+
 /// The paper's sphere, moved from 2.5 to 5 m under the sequence's motion.
 pub fn over_depth(sequence: &Sequence) -> Vec<Coefficients> {
-    let Some(phi) = sequence.phi_cyclopean(0) else { return Vec::new() };
-    let at = |depth_m: f64| {
-        let part = Part { shape: Shape::sphere([-0.35, 0.30, depth_m], 0.40), grey: 185.0, tile_m: 0.0 };
-        let scene = Scene::new(vec![part], Vector3::new(-0.6, -2.0, 0.8), 0.3, 2003);
-        mean_over(&World::new(&scene, &sequence.rig, &phi, 0, 1.0), depth_m)
-    };
-    (0..=10).map(|i| at(2.5 + 0.25 * f64::from(i))).collect()
+    let at = |i: i32| of_sphere(sequence, Swept::Depth, NEAR_M + DEPTH_STEP_M * f64::from(i), 1.0);
+    (0..=10).filter_map(at).collect()
 }
 
-fn mean_over(world: &World, depth_m: f64) -> Coefficients {
+/// The sphere at 2.5 m under 1 to 16 times the sequence's motion; beyond, it leaves the image.
+pub fn over_speed(sequence: &Sequence) -> Vec<Coefficients> {
+    let steps = STEPS.iter().filter(|&&step| step <= 16.0);
+    steps.filter_map(|&step| of_sphere(sequence, Swept::Step, NEAR_M, step)).collect()
+}
+
+/// `None` where no pixel of the sphere is usable.
+fn of_sphere(sequence: &Sequence, swept: Swept, depth_m: f64, step: f64) -> Option<Coefficients> {
+    let part = Part { shape: Shape::sphere([-0.35, 0.30, depth_m], 0.40), grey: 185.0, tile_m: 0.0 };
+    let scene = Scene::new(vec![part], Vector3::new(-0.6, -2.0, 0.8), 0.3, 2003);
+    let world = &World::new(&scene, &sequence.rig, &sequence.phi_cyclopean(0)?, 0, step);
     let bf = world.rig.depth_disparity_product();
     let usable = world.pixels().iter().filter(|pixel| pixel.differential);
     let points: Vec<Exact> = usable.filter_map(|pixel| Exact::at(world, pixel.index)).collect();
@@ -85,9 +110,18 @@ fn mean_over(world: &World, depth_m: f64) -> Coefficients {
             }
         }
     }
-    let scale = 1e6 / points.len().max(1) as f64;
-    let [printed, corrected] = sums.map(|of| of.map(|(d, v)| (scale * d, scale * v)));
-    Coefficients { depth_m, pixels: points.len(), printed, corrected }
+    let n = points.len() as f64;
+    let [printed, corrected] = sums.map(|of| of.map(|(d, v)| (1e6 * d / n, 1e6 * v / n)));
+    let mean_depth_m = points.iter().map(|point| point.depth_m).sum::<f64>() / n;
+    (!points.is_empty()).then_some(Coefficients {
+        swept,
+        step,
+        depth_m,
+        mean_depth_m,
+        pixels: points.len(),
+        printed,
+        corrected,
+    })
 }
 
 /// A coefficient's name, `Coef1_disp`, and how to read it from (Coef_disp, Coef_vel) of the methods.
@@ -103,16 +137,21 @@ const STRONG: [Named; 4] = [
 /// Those of its Figure 6(b); Coef4_vel is zero.
 const WEAK: [Named; 3] = [("Coef1_vel", 0, |c| c.1), ("Coef2_disp", 1, |c| c.0), ("Coef3_vel", 2, |c| c.1)];
 
+fn of<'a>(found: &[&'a Coefficients], swept: Swept) -> Vec<&'a Coefficients> {
+    found.iter().copied().filter(|c| c.swept == swept).collect()
+}
+
 /// Figure 6.
 pub fn figure(found: &[&Coefficients]) -> Figure {
-    let panel = |title: &str, named: &[Named], of: fn(&Coefficients) -> &[(f64, f64); 4]| Panel {
+    let found = &of(found, Swept::Depth);
+    let panel = |title: &str, named: &[Named], all: fn(&Coefficients) -> &[(f64, f64); 4]| Panel {
         title: title.to_owned(),
         content: Content::Plot {
             x: Axis::linear("depth of the sphere (m)"),
             y: Axis::linear("coefficient (mm²/px²)"),
             series: named
                 .iter()
-                .map(|&(name, method, read)| series(name, found, |c| read(of(c)[method])))
+                .map(|&(name, method, read)| series(name, found, |c| read(all(c)[method])))
                 .collect(),
         },
     };
@@ -146,10 +185,12 @@ fn series(name: &str, found: &[&Coefficients], value: impl Fn(&Coefficients) -> 
 pub fn data(found: &[&Coefficients]) -> Table {
     let mut table = Table::new(
         "coefficients",
-        "Coefficients of (53) against depth",
+        "Coefficients of (53) against depth and speed",
         "Means over the sphere's usable pixels; mm² per px².",
         &[
-            ("depth_m", "depth (m)"),
+            ("depth_m", "depth of the centre (m)"),
+            ("mean_depth_m", "mean depth (m)"),
+            ("step", "STEP"),
             ("pixels", "pixels"),
             ("kind", "kind"),
             ("method", "method"),
@@ -161,39 +202,48 @@ pub fn data(found: &[&Coefficients]) -> Table {
         for (kind, of) in [("printed", &c.printed), ("corrected", &c.corrected)] {
             for (method, (disparity, velocity)) in METHODS.into_iter().zip(of) {
                 let numbers = [(*disparity).into(), (*velocity).into()];
-                let head = [c.depth_m.into(), c.pixels.into(), kind.into(), method.into()];
-                table.rows.push(head.into_iter().chain(numbers).collect());
+                let place = [c.depth_m, c.mean_depth_m, c.step].map(Cell::from);
+                let head = [c.pixels.into(), kind.into(), method.into()];
+                table.rows.push(place.into_iter().chain(head).chain(numbers).collect());
             }
         }
     }
     table
 }
 
-/// How fast each coefficient grows: its values at the ends and the power of depth between them.
+/// How fast each coefficient grows with depth, and with speed.
 pub fn table(found: &[&Coefficients]) -> Table {
     let mut table = Table::new(
         "coefficients-growth",
-        "Growth of the coefficients of (53) with depth",
-        "From the nearest to the farthest place of the sphere; the power p of depth in coefficient ∝ Zᵖ. \
-         The paper says between 2 and 4.",
+        "Growth of the coefficients of (53) with depth and with speed",
+        "From the nearest to the farthest place of the sphere, and the power p of the depth of its surface in \
+         coefficient ∝ Zᵖ (the paper says between 2 and 4); then from the motion of sequence C to sixteen times it, the \
+         sphere at 2.5 m.",
         &[
             ("coefficient", "coefficient"),
-            ("printed_near", "printed, near (mm²/px²)"),
-            ("printed_far", "printed, far (mm²/px²)"),
-            ("printed_power", "power"),
-            ("corrected_near", "corrected, near (mm²/px²)"),
-            ("corrected_far", "corrected, far (mm²/px²)"),
-            ("corrected_power", "power"),
+            ("kind", "kind"),
+            ("near", "near (mm²/px²)"),
+            ("far", "far (mm²/px²)"),
+            ("power", "power of depth"),
+            ("slow", "STEP 1 (mm²/px²)"),
+            ("fast", "STEP 16 (mm²/px²)"),
         ],
     );
-    let (Some(near), Some(far)) = (found.first(), found.last()) else { return table };
-    for (name, method, read) in STRONG.iter().chain(&WEAK) {
-        let growth = |of: fn(&Coefficients) -> &[(f64, f64); 4]| {
-            let [a, b] = [near, far].map(|c| read(of(c)[*method]));
-            [a, b, (b / a).ln() / (far.depth_m / near.depth_m).ln()].map(Cell::from)
-        };
-        let numbers = growth(|c| &c.printed).into_iter().chain(growth(|c| &c.corrected));
-        table.rows.push([Cell::from(*name)].into_iter().chain(numbers).collect());
+    let kinds: [(&str, fn(&Coefficients) -> &[(f64, f64); 4]); 2] =
+        [("printed", |c| &c.printed), ("corrected", |c| &c.corrected)];
+    let (depths, steps) = (of(found, Swept::Depth), of(found, Swept::Step));
+    for (kind, all) in kinds {
+        for (name, method, read) in STRONG.iter().chain(&WEAK) {
+            let value = |c: Option<&&Coefficients>| c.map(|c| read(all(c)[*method]));
+            let depth = |c: Option<&&Coefficients>| c.map(|c| c.mean_depth_m);
+            let ends = [depths.first(), depths.last()];
+            let [Some(near), Some(far)] = ends.map(value) else { continue };
+            let [Some(near_m), Some(far_m)] = ends.map(depth) else { continue };
+            let power = (far / near).ln() / (far_m / near_m).ln();
+            let speeds = [steps.first(), steps.last()].map(|c| Cell::from(value(c)));
+            let numbers = [near, far, power].map(Cell::from);
+            table.rows.push([(*name).into(), kind.into()].into_iter().chain(numbers).chain(speeds).collect());
+        }
     }
     table
 }

@@ -79,7 +79,7 @@ pub fn figure_5(sequence: &Sequence) -> Figure {
         caption: "Sequence C, one step; variance (1/4)²/12 = .0052 px² on disparity and flow, clipped at \
                   3000 mm² as in the paper, which shows (39) only. Pixels beside an edge and those that one \
                   camera does not see have no value. The farther a point, the larger its variance; the \
-                  ratio DCCE/DV is large where the image moves fast, below 1 where it moves less than √3 px."
+                  ratio DCCE/DV follows (1 + |v|²)/4, above 1 where the image moves faster than √3 px."
             .to_owned(),
         columns: 3,
         panels: titles.into_iter().zip(fields).map(panel).collect(),

@@ -73,7 +73,7 @@ pub enum Finding {
     Case(Box<Case>),
     /// DCCE against DV over an image.
     Comparison(Comparison),
-    /// The coefficients of (53) at one depth of the sphere.
+    /// The coefficients of (53) at one depth of the sphere and one speed.
     Coefficients(Coefficients),
 }
 

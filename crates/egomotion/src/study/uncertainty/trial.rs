@@ -1,5 +1,7 @@
 //! Settings drawn at random from the sequences, and what is found at each.
 
+use std::collections::BTreeMap;
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
@@ -21,6 +23,8 @@ const DISPARITY_PX: [f64; 6] = [1.0 / 32.0, 1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.
 const FLOW_PX: [f64; 5] = [0.0, 1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
 /// Rounding has heavy tails where few draws leave a level: so many times more draws.
 const ROUNDING_DRAWS: usize = 5;
+/// Levels that the disparity of a surface spans for its rounding error to be uniform.
+const MANY_LEVELS: f64 = 10.0;
 /// Normal quantile of 95 %.
 const NORMAL_95: f64 = 1.959_964;
 
@@ -111,15 +115,15 @@ pub fn cases(family: Family, sequence: &Sequence, settings: usize, draws: usize,
         let pose = rng.random_range(-2..=2);
         let world = World::new(&sequence.scene, &sequence.rig, &phi, pose, step);
         let drawn = draw_settings(family, &world, settings, &mut rng);
-        let one = |(k, (exact, noise, levels)): (u64, &(Exact, Noise, usize))| {
-            let at = Setting { sequence, step, pose, exact: *exact, noise: *noise, levels: *levels };
-            at_setting(family, &at, draws, mixed(&[seed, i, k]))
+        let one = |(k, &(exact, noise, levels)): (usize, &(Exact, Noise, usize))| {
+            let at = Setting { sequence, step, pose, exact, noise, levels };
+            at_setting(family, &at, draws, mixed(&[seed, i, k as u64]))
         };
-        (0..).zip(&drawn).flat_map(one).collect::<Vec<_>>()
+        drawn.par_iter().enumerate().flat_map_iter(one).collect::<Vec<_>>()
     };
     let mut cases: Vec<Case> = (0..).zip(&STEPS).flat_map(of_step).collect();
     if family == Family::Rounding {
-        cases.extend(LEVELS.iter().map(|&levels| over_all_points(sequence, &phi, levels, draws, seed)));
+        cases.extend(LEVELS.iter().flat_map(|&levels| over_all_points(sequence, &phi, levels, draws, seed)));
     }
     cases
 }
@@ -192,32 +196,42 @@ fn at_setting(family: Family, at: &Setting<'_>, draws: usize, seed: u64) -> Vec<
     all.map(|(quantity, inputs, p, drawn)| case(quantity, inputs, p, &drawn)).collect()
 }
 
-/// The error of rounding alone, over random places of the image from the pose exp(φ).
-fn over_all_points(sequence: &Sequence, phi: &Twist, levels: usize, draws: usize, seed: u64) -> Case {
+/// The error of rounding alone, over random places of the view from the pose exp(φ): all of them, and those
+/// on surfaces whose disparity spans [`MANY_LEVELS`] levels.
+fn over_all_points(sequence: &Sequence, phi: &Twist, levels: usize, draws: usize, seed: u64) -> [Case; 2] {
     let view = View::new(&sequence.scene, &sequence.rig, reference_pose(phi, 1));
     let (width, height) = (sequence.rig.width_px as f64 - 1.0, sequence.rig.height_px as f64 - 1.0);
     let n = levels as f64;
-    let error = |i: usize| {
+    let seen = |i: usize| {
         let mut rng = Pcg64Mcg::seed_from_u64(mixed(&[seed, levels as u64, i as u64]));
-        let (u, v) = (width * rng.random::<f64>(), height * rng.random::<f64>());
-        let d = view.structure_at(u, v)?.0.z;
-        Some((d * n + 0.5).floor() / n - d)
+        let (xyd, surface) = view.structure_at(width * rng.random::<f64>(), height * rng.random::<f64>())?;
+        Some((xyd.z, surface))
     };
-    let errors: Vec<f64> = (0..draws).into_par_iter().filter_map(error).collect();
-    let drawn = Drawn::of(&errors);
-    Case {
-        family: Family::Rounding,
-        formula: "(52)".to_owned(),
-        kind: Kind::Printed,
-        inputs: Inputs::Raw,
-        quantity: "d, over the view".to_owned(),
-        sequence: sequence.name.clone(),
-        step: 1.0,
-        place: None,
-        levels: Some(levels),
-        predicted: rounding_variance(1.0 / n),
-        empirical: drawn.variance,
-        standard_error: drawn.standard_error,
-        draws: drawn.draws,
+    let seen: Vec<(f64, u16)> = (0..draws).into_par_iter().filter_map(seen).collect();
+    let mut ranges = BTreeMap::new();
+    for &(d, surface) in &seen {
+        let (lo, hi) = ranges.entry(surface).or_insert((d, d));
+        (*lo, *hi) = (d.min(*lo), d.max(*hi));
     }
+    let spans = |surface: &u16| ranges.get(surface).is_some_and(|(lo, hi)| (hi - lo) * n >= MANY_LEVELS);
+    let case = |quantity: &str, counts: &dyn Fn(&u16) -> bool| {
+        let points = seen.iter().filter(|(_, surface)| counts(surface));
+        let drawn = Drawn::of(&points.map(|(d, _)| (d * n + 0.5).floor() / n - d).collect::<Vec<_>>());
+        Case {
+            family: Family::Rounding,
+            formula: "(52)".to_owned(),
+            kind: Kind::Printed,
+            inputs: Inputs::Raw,
+            quantity: quantity.to_owned(),
+            sequence: sequence.name.clone(),
+            step: 1.0,
+            place: None,
+            levels: Some(levels),
+            predicted: rounding_variance(1.0 / n),
+            empirical: drawn.variance,
+            standard_error: drawn.standard_error,
+            draws: drawn.draws,
+        }
+    };
+    [case("d, all surfaces", &|_| true), case("d, slanted surfaces", &spans)]
 }
