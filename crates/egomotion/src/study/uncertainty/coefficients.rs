@@ -127,6 +127,9 @@ fn of_sphere(sequence: &Sequence, swept: Swept, depth_m: f64, step: f64) -> Opti
 /// A coefficient's name, `Coef1_disp`, and how to read it from (Coef_disp, Coef_vel) of the methods.
 type Named = (&'static str, usize, fn((f64, f64)) -> f64);
 
+/// The coefficients of all four methods, printed or corrected.
+type All = fn(&Coefficients) -> &[(f64, f64); 4];
+
 /// Those of the paper's Figure 6(a), which grow strongly with depth.
 const STRONG: [Named; 4] = [
     ("Coef1_disp", 0, |c| c.0),
@@ -144,7 +147,7 @@ fn of<'a>(found: &[&'a Coefficients], swept: Swept) -> Vec<&'a Coefficients> {
 /// Figure 6.
 pub fn figure(found: &[&Coefficients]) -> Figure {
     let found = &of(found, Swept::Depth);
-    let panel = |title: &str, named: &[Named], all: fn(&Coefficients) -> &[(f64, f64); 4]| Panel {
+    let panel = |title: &str, named: &[Named], all: All| Panel {
         title: title.to_owned(),
         content: Content::Plot {
             x: Axis::linear("depth of the sphere (m)"),
@@ -229,8 +232,7 @@ pub fn table(found: &[&Coefficients]) -> Table {
             ("fast", "STEP 16 (mm²/px²)"),
         ],
     );
-    let kinds: [(&str, fn(&Coefficients) -> &[(f64, f64); 4]); 2] =
-        [("printed", |c| &c.printed), ("corrected", |c| &c.corrected)];
+    let kinds: [(&str, All); 2] = [("printed", |c| &c.printed), ("corrected", |c| &c.corrected)];
     let (depths, steps) = (of(found, Swept::Depth), of(found, Swept::Step));
     for (kind, all) in kinds {
         for (name, method, read) in STRONG.iter().chain(&WEAK) {

@@ -136,10 +136,11 @@ impl Study for Uncertainty {
             Part::Comparison(name) => {
                 comparison::over_steps(&self.sequence(name)?).into_iter().map(Finding::Comparison).collect()
             }
-            Part::Coefficients => coefficients::over_depth(&self.sequence("C")?)
-                .into_iter()
-                .map(Finding::Coefficients)
-                .collect(),
+            Part::Coefficients => {
+                let sequence = self.sequence("C")?;
+                let found = [coefficients::over_depth(&sequence), coefficients::over_speed(&sequence)];
+                found.into_iter().flatten().map(Finding::Coefficients).collect()
+            }
         })
     }
 
