@@ -184,6 +184,14 @@ pub fn rounding(cases: &[&Case]) -> Table {
     table
 }
 
+/// Name of the axis of ratios.
+const RATIO: &str = "empirical/predicted";
+
+/// Whether ratios of this estimator's printed formulas spread over decades.
+fn wide(family: &Family) -> bool {
+    matches!(family, Family::DcceDiscrete | Family::Rounding)
+}
+
 /// Ratio against σ_d/d, a panel for each estimator.
 pub fn figure(cases: &[&Case]) -> Figure {
     let raw: Vec<&Case> =
@@ -200,7 +208,7 @@ pub fn figure(cases: &[&Case]) -> Figure {
             title: family.name().to_owned(),
             content: Content::Plot {
                 x: Axis::log("σ_d/d"),
-                y: Axis::log("empirical/predicted"),
+                y: if wide(family) { Axis::log(RATIO) } else { Axis::linear(RATIO) },
                 series: bounds.into_iter().chain(series).collect(),
             },
         }
@@ -219,6 +227,9 @@ pub fn figure(cases: &[&Case]) -> Figure {
     }
 }
 
+/// Least share of the product that is shown: draws find it to about a third of that.
+const LEAST_PRODUCT: f64 = 0.01;
+
 /// What (39c) and (47c) leave out: the excess of the empirical variance against the product of noises.
 pub fn product_figure(cases: &[&Case]) -> Figure {
     let mut found: [Vec<(&Case, f64)>; 2] = Default::default();
@@ -228,20 +239,22 @@ pub fn product_figure(cases: &[&Case]) -> Figure {
             continue;
         }
         // An experiment lists its corrected variance after that of first order.
-        let discrete = usize::from(first.family == Family::DcceDiscrete);
-        found[discrete].push((first, next.predicted / first.predicted - 1.0));
+        let product = next.predicted / first.predicted - 1.0;
+        if product > LEAST_PRODUCT {
+            found[usize::from(first.family == Family::DcceDiscrete)].push((first, product));
+        }
     }
     let drawn = ["(39c), differential", "(47c), discrete"].into_iter().zip(&found).map(|(name, found)| {
         let points = found.iter().map(|&(case, x)| Point {
             x,
-            y: case.ratio(),
+            y: case.ratio() - 1.0,
             standard_error: Some(case.standard_error / case.predicted),
         });
         let mut points: Vec<Point> = points.collect();
         points.sort_by(|a, b| a.x.total_cmp(&b.x));
         Series { name: name.to_owned(), line: Line::Marks, points }
     });
-    let rule = reference("1 + product", &[(0.0, 1.0), (0.5, 1.5)]);
+    let rule = reference("the product", &[(LEAST_PRODUCT, LEAST_PRODUCT), (0.5, 0.5)]);
     Figure {
         id: "figure-product".to_owned(),
         title: "What first order leaves out of DCCE".to_owned(),
@@ -255,8 +268,8 @@ pub fn product_figure(cases: &[&Case]) -> Figure {
         panels: vec![Panel {
             title: "DCCE".to_owned(),
             content: Content::Plot {
-                x: Axis::linear("product of noises over first order"),
-                y: Axis::linear("empirical/first order"),
+                x: Axis::log("product of noises over first order"),
+                y: Axis::log("empirical/first order − 1"),
                 series: [rule].into_iter().chain(drawn).collect(),
             },
         }],

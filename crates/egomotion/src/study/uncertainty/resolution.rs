@@ -47,7 +47,8 @@ pub fn table() -> Table {
 
 /// Side of the pixels of Figure 3(a), in pixels: real ones could not be seen.
 const COARSE_PX: f64 = 8.0;
-/// Where the rays of Figure 3(a) end, in millimetres.
+/// Where the rays of Figure 3(a) begin and end, in millimetres.
+const NEAR_MM: f64 = 900.0;
 const FAR_MM: f64 = 7000.0;
 
 /// Figure 3.
@@ -55,8 +56,9 @@ pub fn figure() -> Figure {
     let plan = Content::Plot {
         x: Axis::linear("X (mm)"),
         y: Axis::linear("Z (mm)"),
-        series: [rays("rays of the left camera", -HALF_MM), rays("rays of the right camera", HALF_MM)]
+        series: [("rays of the left camera", -HALF_MM), ("rays of the right camera", HALF_MM)]
             .into_iter()
+            .flat_map(|(name, centre_mm)| (-3..=3).map(move |k| ray(name, centre_mm, k)))
             .chain([5.0, 4.0, 3.0, 2.0].map(cell))
             .collect(),
     };
@@ -94,14 +96,11 @@ fn point(x: f64, y: f64) -> Point {
     Point { x, y, standard_error: None }
 }
 
-/// Rays of the camera at `centre_mm` through borders of coarse pixels, drawn out and back.
-fn rays(name: &str, centre_mm: f64) -> Series {
-    let focal_px = 5.0 / 0.012;
-    let ray = |k: i32| {
-        let x = centre_mm + FAR_MM * f64::from(k) * COARSE_PX / focal_px;
-        [point(centre_mm, 0.0), point(x, FAR_MM), point(centre_mm, 0.0)]
-    };
-    Series { name: name.to_owned(), line: Line::Reference, points: (-4..=4).flat_map(ray).collect() }
+/// Ray of the camera at `centre_mm` through the `k`-th border of coarse pixels.
+fn ray(name: &str, centre_mm: f64, k: i32) -> Series {
+    let slope = f64::from(k) * COARSE_PX * 0.012 / 5.0;
+    let points = [NEAR_MM, FAR_MM].map(|z| point(centre_mm + z * slope, z)).to_vec();
+    Series { name: name.to_owned(), line: Line::Reference, points }
 }
 
 /// The cell of a coarse pixel of each camera, `disparity` coarse pixels apart, near the middle.
