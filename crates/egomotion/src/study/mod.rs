@@ -8,11 +8,8 @@ pub mod draw;
 pub mod figure;
 pub mod sensitivity;
 pub mod table;
-<<<<<<< HEAD
-pub mod uncertainty;
-=======
 pub mod tally;
->>>>>>> main
+pub mod uncertainty;
 pub mod world;
 
 use serde::Serialize;
