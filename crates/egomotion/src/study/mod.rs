@@ -4,6 +4,7 @@
 //! tables and figures as plain values ([`Publication`]). Files, pages and progress are the command's.
 
 pub mod figure;
+pub mod real;
 pub mod table;
 
 use serde::Serialize;
