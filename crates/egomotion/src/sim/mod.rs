@@ -14,7 +14,7 @@ pub mod truth;
 pub use noise::SensorNoise;
 pub use render::{StereoImages, View};
 pub use scene::{Hit, Part, Scene};
-pub use sequences::Sequence;
+pub use sequences::{Sequence, reference_pose};
 pub use shape::Shape;
 pub use texture::Texture;
 pub use truth::{MotionTruth, PointTruth, field_of};

@@ -6,6 +6,7 @@
 pub mod figure;
 pub mod real;
 pub mod table;
+pub mod world;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
