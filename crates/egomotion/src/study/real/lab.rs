@@ -122,7 +122,7 @@ impl LabStudy {
         let to_cyclopean = -rig.left_from_cyclopean();
         let phi = |(way, estimate): &(Way, _)| {
             let estimate: &crate::estimate::MotionEstimate = estimate;
-            draw.phi(*way, &estimate.seen_from(&to_cyclopean), &stage.phi)
+            draw.phi(*way, &estimate.seen_from(&to_cyclopean), &stage.motion())
         };
         let mut records: Vec<Record> = ways.iter().flat_map(phi).collect();
         records.extend(truth.matching(&draw, &measured));

@@ -13,7 +13,9 @@ pub mod estimates;
 pub mod lab;
 pub mod measured;
 pub mod printed;
+mod publish;
 pub mod record;
+mod stage;
 pub mod way;
 
 pub use lab::{LabError, LabStudy};

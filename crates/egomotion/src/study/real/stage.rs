@@ -1,6 +1,6 @@
 //! A sequence around its reference poses: images of every draw, and exact truth to judge by.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::measured::Measured;
 use super::record::{Draw, Record};
@@ -8,8 +8,8 @@ use super::way::{Quantity, Way};
 use crate::geometry::{Field, Grid, Twist};
 use crate::metrics::quantile;
 use crate::pipeline::Approach;
-use crate::sim::sequences::reference_pose;
-use crate::sim::{MotionTruth, PointTruth, SensorNoise, Sequence, StereoImages, View};
+use crate::sim::{SensorNoise, Sequence, StereoImages, View, reference_pose};
+use crate::study::world::World;
 
 /// Rays through a pixel at an edge between surfaces, in each direction.
 const RAYS: usize = 3;
@@ -18,26 +18,25 @@ const RAYS: usize = 3;
 pub(super) struct Stage {
     pub(super) sequence: Sequence,
     pub(super) seed: u64,
-    /// φ of the cyclopean camera from one frame of a draw to the next.
-    pub(super) phi: Twist,
-    unit: Twist,
+    /// φ of the cyclopean camera from one frame of the sequence to the next.
+    phi: Twist,
     step: i32,
     images: BTreeMap<i32, StereoImages>,
 }
 
 impl Stage {
     pub(super) fn new(sequence: Sequence, seed: u64, step: u32, poses: &[i32]) -> Self {
-        let unit = sequence.phi_cyclopean(0).unwrap_or_else(Twist::zero);
+        let phi = sequence.phi_cyclopean(0).unwrap_or_else(Twist::zero);
         let step = i32::try_from(step.max(1)).unwrap_or(i32::MAX);
-        let mut stage =
-            Self { phi: unit.scaled(f64::from(step)), unit, step, images: BTreeMap::new(), sequence, seed };
-        for at in poses.iter().flat_map(|&k| stage.times(k)) {
-            if !stage.images.contains_key(&at) {
-                let images = stage.view(at).render(RAYS);
-                stage.images.insert(at, images);
-            }
-        }
+        let mut stage = Self { sequence, seed, phi, step, images: BTreeMap::new() };
+        let needed: BTreeSet<i32> = poses.iter().flat_map(|&k| stage.times(k)).collect();
+        stage.images = needed.into_iter().map(|at| (at, stage.view(at).render(RAYS))).collect();
         stage
+    }
+
+    /// φ of the cyclopean camera from one frame of a draw to the next.
+    pub(super) fn motion(&self) -> Twist {
+        self.phi.scaled(self.step.into())
     }
 
     /// Poses of the frames t−1, t, t+1 around reference pose `k`.
@@ -46,18 +45,15 @@ impl Stage {
     }
 
     fn view(&self, k: i32) -> View<'_> {
-        View::new(&self.sequence.scene, &self.sequence.rig, reference_pose(&self.unit, k))
+        View::new(&self.sequence.scene, &self.sequence.rig, reference_pose(&self.phi, k))
     }
 
-    /// The frames around one of its reference poses, with noise that no other draw has.
+    /// The frames around a reference pose, with noise that no other draw has.
     pub(super) fn frames(&self, k: i32) -> [StereoImages; 3] {
         let noise = SensorNoise::default().with_seed(self.seed);
-        // Streams 0, 1, 2 for pose 0, 3, 4, 5 for pose 1, … and the same from the other end below 0.
-        let first = i64::from(k).wrapping_mul(3) as u64;
-        let mut side = 0;
+        let mut stream = i64::from(k).wrapping_mul(3) as u64;
         self.times(k).map(|at| {
-            let stream = first.wrapping_add(side);
-            side += 1;
+            stream = stream.wrapping_add(1);
             match self.images.get(&at) {
                 Some(images) => noise.expose(images, stream),
                 None => noise.expose(&self.view(at).render(RAYS), stream),
@@ -65,77 +61,57 @@ impl Stage {
         })
     }
 
+    /// What is true at a reference pose.
     pub(super) fn truth(&self, k: i32) -> Truth {
-        let [before, now, after] = self.times(k).map(|at| self.view(at).truth());
-        let motion = self.view(k).motion(&now, &self.phi_left());
-        let on = |truth: &Grid<Option<PointTruth>>, u: usize, v: usize| truth.at(u, v).map(|t| t.surface);
-        let (width, height) = now.size();
-        let one_surface = |times: &[&Grid<Option<PointTruth>>], u: usize, v: usize| {
-            let inner = u > 0 && v > 0 && u + 1 < width && v + 1 < height;
-            let here = on(&now, u, v);
-            let stencil = [(u, v), (u + 1, v), (u, v + 1), (u.wrapping_sub(1), v), (u, v.wrapping_sub(1))];
-            inner && times.iter().all(|t| stencil.iter().all(|&(u, v)| on(t, u, v) == here))
+        let Sequence { scene, rig, .. } = &self.sequence;
+        let world = World::new(scene, rig, &self.phi, k, self.step.into());
+        let (view, motion) = (self.view(k), world.phi.exp());
+        let vz = |u: usize, v: usize| {
+            let point = rig.point(&view.structure_at(u as f64, v as f64)?.0)?;
+            Some([world.phi.velocity(&point).z, motion.apply(&point).z - point.z])
         };
-        let seen = |u: usize, v: usize| {
-            let both = now.at(u, v).is_some_and(|point| point.in_right);
-            both && motion.at(u, v).is_some_and(|motion| motion.in_later)
-        };
-        let usable = [&[&before, &now, &after][..], &[&now, &after]]
-            .map(|times| Grid::from_fn(width, height, |u, v| one_surface(times, u, v) && seen(u, v)));
-        Truth { points: now, motion, usable }
-    }
-
-    fn phi_left(&self) -> Twist {
-        self.phi.seen_from(&self.sequence.rig.left_from_cyclopean())
+        Truth { vz_m: Grid::from_fn(rig.width_px, rig.height_px, vz), world }
     }
 }
 
-/// The exact truth of every pixel at t.
+/// The exact truth at t.
 pub(super) struct Truth {
-    points: Grid<Option<PointTruth>>,
-    motion: Grid<Option<MotionTruth>>,
-    /// Where the differential and the discrete approach can measure at all.
-    usable: [Grid<bool>; 2],
+    world: World,
+    /// VZ and Z′ − Z of every pixel, in metres per frame.
+    vz_m: Grid<Option<[f64; 2]>>,
 }
 
 impl Truth {
-    /// VZ of a map against the truth of its approach: instantaneous, or Z′ − Z.
+    /// A map of VZ against the truth of its approach: where it can be measured, and anywhere it was.
     pub(super) fn vz(&self, draw: &Draw, way: Way, map: &Field) -> Vec<Record> {
-        let discrete = way.approach == Approach::Discrete;
-        let usable = &self.usable[usize::from(discrete)];
-        let (mut inside, mut anywhere) = (Vec::new(), Vec::new());
-        for v in 0..map.height() {
-            for u in 0..map.width() {
-                let (Some(value), Some(point)) = (map.get(u, v), self.points.at(u, v)) else { continue };
-                let Some(motion) = self.motion.at(u, v) else { continue };
-                let truth = if discrete { motion.depth_change_m(&point) } else { motion.velocity.z };
-                let pair = (1e3 * f64::from(value), 1e3 * truth);
-                anywhere.push(pair);
-                if usable.at(u, v) {
-                    inside.push(pair);
-                }
-            }
-        }
+        let differential = way.approach == Approach::Differential;
+        let found = map.grid().values();
+        let pair = |found: f32, vz_m: f64| (1e3 * f64::from(found), 1e3 * vz_m);
+        let usable = self.world.pixels().iter().filter(|pixel| pixel.differential || !differential);
+        let inside: Vec<(f64, f64)> = usable
+            .map(|pixel| (pixel.index, if differential { pixel.vz_m } else { pixel.depth_change_m }))
+            .filter_map(|(index, vz_m)| Some(pair(*found.get(index)?, vz_m)))
+            .collect();
+        let anywhere: Vec<(f64, f64)> = found
+            .iter()
+            .zip(self.vz_m.values())
+            .filter_map(|(&found, vz_m)| Some(pair(found, vz_m.map(|vz| vz[usize::from(!differential)])?)))
+            .collect();
         let record = |quantity, pairs: &[_]| draw.record(Some(way), quantity, pairs);
         record(Quantity::Vz, &inside).into_iter().chain(record(Quantity::VzAnywhere, &anywhere)).collect()
     }
 
-    /// Median errors of disparity and flow at usable pixels.
+    /// Median errors of disparity and of flow, where they can be measured.
     pub(super) fn matching(&self, draw: &Draw, measured: &Measured) -> Vec<Record> {
-        let usable = &self.usable[1];
+        let width = self.vz_m.width();
         let (mut disparity, mut flow) = (Vec::new(), Vec::new());
-        for v in 0..usable.height() {
-            for u in (0..usable.width()).filter(|&u| usable.at(u, v)) {
-                let (Some(point), Some(motion)) = (self.points.at(u, v), self.motion.at(u, v)) else {
-                    continue;
-                };
-                if let Some(shift) = measured.disparity[1].shift.get(u, v) {
-                    disparity.push((f64::from(shift) - point.disparity_px()).abs());
-                }
-                if let (Some(found), Some(moved)) = (measured.flow.get(u, v), motion.displacement_px(&point))
-                {
-                    flow.push((found.mean - moved).norm());
-                }
+        for pixel in self.world.pixels() {
+            let (u, v) = (pixel.index % width, pixel.index / width);
+            if let Some(shift) = measured.disparity[1].shift.get(u, v) {
+                disparity.push((measured.rig.disparity_from_shift(shift.into()) - pixel.xyd.z).abs());
+            }
+            if let Some(found) = measured.flow.get(u, v) {
+                flow.push((found.mean - (pixel.later_xyd - pixel.xyd).xy()).norm());
             }
         }
         let record = |quantity, errors: &[f64]| {
