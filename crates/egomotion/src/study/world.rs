@@ -32,14 +32,17 @@ pub struct UsablePixel {
     pub vz_m: f64,
     /// Z′ − Z, in metres per interval.
     pub depth_change_m: f64,
-    /// Whether the five-pixel stencil lies on one surface at t − 1 too.
+    /// Whether the differential form may use it.
     pub differential: bool,
+    /// Whether the discrete form may use it.
+    pub discrete: bool,
 }
 
 /// The world around one reference pose, for one motion of a frame pair.
 ///
-/// A pixel may be used if it and its four neighbours lie on one surface, the same at t and t + 1 (at t − 1
-/// too in the differential form), and both cameras see it.
+/// A pixel may be used if both cameras see it and every disparity that its gradient and its rate are made of
+/// lies on one surface: in the differential form its four neighbours and itself at t, and itself at t − 1 and
+/// t + 1; in the discrete form its four neighbours and itself both at t and at t′.
 #[derive(Debug, Clone, PartialEq)]
 pub struct World {
     /// The cameras.
@@ -78,7 +81,7 @@ impl World {
         Self { rig: *rig, phi, moments, pixels }
     }
 
-    /// Usable pixels of the discrete form, in row-major order; those of the differential form are marked.
+    /// Pixels that one of the two forms may use, in row-major order.
     pub fn pixels(&self) -> &[UsablePixel] {
         &self.pixels
     }
@@ -114,8 +117,12 @@ fn stencil(surface: &[Option<u16>], index: usize, width: usize, height: usize) -
 
 fn usable(view: &View<'_>, moments: &[Moment; 3], phi: &Twist, index: usize) -> Option<UsablePixel> {
     let (width, height) = (view.rig.width_px, view.rig.height_px);
-    let [before, now, after] = moments.each_ref().map(|m| stencil(&m.surface, index, width, height));
-    if now.is_none() || now != after {
+    let [before, now, after] = moments;
+    let surface = stencil(&now.surface, index, width, height)?;
+    let stays = |moment: &Moment| moment.surface[index] == Some(surface);
+    let differential = stays(before) && stays(after);
+    let discrete = stencil(&after.surface, index, width, height) == Some(surface);
+    if !(differential || discrete) {
         return None;
     }
     let truth = view.truth_at((index % width) as f64, (index / width) as f64).filter(|t| t.in_right)?;
@@ -129,6 +136,7 @@ fn usable(view: &View<'_>, moments: &[Moment; 3], phi: &Twist, index: usize) -> 
         later_xyd: moved.later_xyd?,
         vz_m: moved.velocity.z,
         depth_change_m: moved.depth_change_m(&truth),
-        differential: now == before,
+        differential,
+        discrete,
     })
 }

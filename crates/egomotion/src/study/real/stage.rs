@@ -87,7 +87,8 @@ impl Truth {
         let differential = way.approach == Approach::Differential;
         let found = map.grid().values();
         let pair = |found: f32, vz_m: f64| (1e3 * f64::from(found), 1e3 * vz_m);
-        let usable = self.world.pixels().iter().filter(|pixel| pixel.differential || !differential);
+        let usable =
+            self.world.pixels().iter().filter(|p| if differential { p.differential } else { p.discrete });
         let inside: Vec<(f64, f64)> = usable
             .map(|pixel| (pixel.index, if differential { pixel.vz_m } else { pixel.depth_change_m }))
             .filter_map(|(index, vz_m)| Some(pair(*found.get(index)?, vz_m)))
@@ -105,7 +106,7 @@ impl Truth {
     pub(super) fn matching(&self, draw: &Draw, measured: &Measured) -> Vec<Record> {
         let width = self.vz_m.width();
         let (mut disparity, mut flow) = (Vec::new(), Vec::new());
-        for pixel in self.world.pixels() {
+        for pixel in self.world.pixels().iter().filter(|pixel| pixel.discrete) {
             let (u, v) = (pixel.index % width, pixel.index / width);
             if let Some(shift) = measured.disparity[1].shift.get(u, v) {
                 disparity.push((measured.rig.disparity_from_shift(shift.into()) - pixel.xyd.z).abs());

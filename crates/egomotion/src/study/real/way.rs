@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::pipeline::{Approach, Method};
+use crate::pipeline::{Approach, EstimatorKind, Method};
+use crate::study::contender::{Contender, approach_name};
 
 /// How equations are solved; the method's own answer at each pixel needs no estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -102,25 +103,15 @@ impl Way {
 
     /// Names of approach, method and estimator in a file.
     pub fn names(&self) -> [&'static str; 3] {
-        let approach = match self.approach {
-            Approach::Differential => "differential",
-            Approach::Discrete => "discrete",
-        };
-        let method = match self.method {
-            Method::Ml => "ml",
-            Method::Dcce => "dcce",
-            Method::Dv => "dv",
-            Method::Joint => "joint",
-            Method::Rigid => "rigid",
-            Method::Linear22 => "linear22",
-        };
+        let contender =
+            Contender { approach: self.approach, method: self.method, estimator: EstimatorKind::Ls };
         let estimator = match self.estimator {
             Estimator::Pixel => "",
             Estimator::Ls => "ls",
             Estimator::Lmeds => "lmeds",
             Estimator::Ml => "ml",
         };
-        [approach, method, estimator]
+        [approach_name(self.approach), contender.method_name(), estimator]
     }
 
     /// Name on a page: `DCCE, LS`.

@@ -30,7 +30,7 @@ pub(super) fn aggregated(results: &Results<'_>) -> Table {
     let mut table = Table::new(
         "real",
         "Section 7.2, summed up",
-        "ERM in percent, all else in mm, degrees or pixels; std of VZ is over pixels and draws, all other std and \
+        "ERM in percent, all else in mm, degrees or pixels; std is in percent where there is an ERM; that of VZ is over pixels and draws, all other std and \
          the scatter of the estimate are over draws; n counts draws; value is the sequence's speed in mm or degrees.",
         &columns.map(|name| (name, name)),
     );
@@ -48,7 +48,10 @@ pub(super) fn aggregated(results: &Results<'_>) -> Table {
             vec![sequence.into(), "images".into(), "speed".into(), speed(sequence).into()];
         row.extend(names(way).map(Cell::from));
         row.push(quantity.name().into());
-        row.extend([found.erm_signed, found.erm_abs, Some(found.eam), Some(found.std)].map(Cell::from));
+        row.extend(
+            [found.erm_signed, found.erm_abs, Some(found.eam), found.std_percent.or(Some(found.std))]
+                .map(Cell::from),
+        );
         row.extend([found.standard_error.into(), found.n.into()]);
         row.extend([found.estimate, found.truth, found.scatter].map(Cell::from));
         table.rows.push(row);
