@@ -7,7 +7,7 @@ use super::way::{Estimator, Way};
 use crate::geometry::Field;
 use crate::motion::DepthVelocity;
 use crate::motion::depth_velocity::{dcce, dv, dv_discrete};
-use crate::pipeline::{Approach, Method};
+use crate::pipeline::{Approach, FrameMotion, Method};
 
 /// The ways of finding VZ at a pixel: (7), (9), (17) and (21).
 pub const WAYS: [Way; 4] = [
@@ -16,6 +16,12 @@ pub const WAYS: [Way; 4] = [
     Way::new(Approach::Discrete, Method::Dcce, Estimator::Pixel),
     Way::new(Approach::Discrete, Method::Dv, Estimator::Pixel),
 ];
+
+/// The maps of [`WAYS`], and that of the pipeline's answer for the same frames.
+pub fn maps(measured: &Measured, best: &FrameMotion) -> Vec<(Way, Field)> {
+    let best = best.dense.as_ref().map(|dense| (Way::BEST, dense.motion.depth_velocity.clone()));
+    WAYS.map(|way| (way, map(measured, way))).into_iter().chain(best).collect()
+}
 
 /// VZ in metres per frame, on the pixel grid of t; missing where something it needs was not measured.
 ///

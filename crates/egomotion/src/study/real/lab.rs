@@ -9,8 +9,7 @@ use super::record::{Draw, Record};
 use super::stage::Stage;
 use super::way::Way;
 use super::{depth_velocity, estimates, publish};
-use crate::geometry::Field;
-use crate::pipeline::FrameMotion;
+use crate::estimate::MotionEstimate;
 use crate::pipeline::stereo::PipelineError;
 use crate::sim::{Sequence, StereoImages};
 use crate::study::{Publication, Study};
@@ -59,7 +58,7 @@ impl Default for LabStudy {
 
 /// Why a part of the study cannot run.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum LabError {
+pub enum RealError {
     /// There is no such sequence, or the images have no pixels.
     #[error("no sequence {name} of {width}x{height} pixels")]
     Sequence {
@@ -91,24 +90,24 @@ impl LabStudy {
     }
 
     /// The sequence of that name with the texture of that seed.
-    fn sequence(&self, name: &str, seed: u64) -> Result<Sequence, LabError> {
+    fn sequence(&self, name: &str, seed: u64) -> Result<Sequence, RealError> {
         let size = (self.width_px, self.height_px);
-        let unknown = || LabError::Sequence { name: name.to_owned(), width: size.0, height: size.1 };
+        let unknown = || RealError::Sequence { name: name.to_owned(), width: size.0, height: size.1 };
         let mut sequence = Sequence::named(name, Some(size), Some(2), 1.0).ok_or_else(unknown)?;
         sequence.scene = sequence.scene.with_texture(seed);
         Ok(sequence)
     }
 
     /// Everything estimated with one texture, for all reference poses.
-    pub(super) fn draw(&self, name: &str, seed: u64) -> Result<Vec<Record>, LabError> {
+    pub(super) fn draw(&self, name: &str, seed: u64) -> Result<Vec<Record>, RealError> {
         let poses: Vec<i32> = (-self.reach()..=self.reach()).collect();
         let stage = Stage::new(self.sequence(name, seed)?, seed, self.step, &poses);
-        let records: Result<Vec<Vec<Record>>, LabError> =
+        let records: Result<Vec<Vec<Record>>, RealError> =
             poses.par_iter().map(|&k| self.pose(&stage, k)).collect();
         Ok(records?.into_iter().flatten().collect())
     }
 
-    fn pose(&self, stage: &Stage, k: i32) -> Result<Vec<Record>, LabError> {
+    fn pose(&self, stage: &Stage, k: i32) -> Result<Vec<Record>, RealError> {
         let rig = &stage.sequence.rig;
         let draw = Draw { sequence: stage.sequence.name.clone(), pose: k.into(), seed: stage.seed };
         let frames = stage.frames(k);
@@ -120,13 +119,12 @@ impl LabStudy {
         let mut ways = estimates::printed_ways(&measured, self.sample_step_px, stage.seed);
         ways.extend(best.motion.as_ref().ok().map(|estimate| (Way::BEST, *estimate)));
         let to_cyclopean = -rig.left_from_cyclopean();
-        let phi = |(way, estimate): &(Way, _)| {
-            let estimate: &crate::estimate::MotionEstimate = estimate;
+        let phi = |(way, estimate): &(Way, MotionEstimate)| {
             draw.phi(*way, &estimate.seen_from(&to_cyclopean), &stage.motion())
         };
         let mut records: Vec<Record> = ways.iter().flat_map(phi).collect();
         records.extend(truth.matching(&draw, &measured));
-        for (way, map) in vz_maps(&measured, &best) {
+        for (way, map) in depth_velocity::maps(&measured, &best) {
             records.extend(truth.vz(&draw, way, &map));
         }
         Ok(records)
@@ -142,15 +140,9 @@ impl LabStudy {
     }
 }
 
-fn vz_maps(measured: &Measured, best: &FrameMotion) -> Vec<(Way, Field)> {
-    let printed = depth_velocity::WAYS.map(|way| (way, depth_velocity::map(measured, way)));
-    let best = best.dense.as_ref().map(|dense| (Way::BEST, dense.motion.depth_velocity.clone()));
-    printed.into_iter().chain(best).collect()
-}
-
 impl Study for LabStudy {
     type Record = Record;
-    type Error = LabError;
+    type Error = RealError;
 
     fn name(&self) -> &'static str {
         "real"
@@ -160,7 +152,7 @@ impl Study for LabStudy {
         self.draws().iter().map(|(name, seed)| format!("{name} seed {seed}")).collect()
     }
 
-    fn run(&self, part: usize) -> Result<Vec<Record>, LabError> {
+    fn run(&self, part: usize) -> Result<Vec<Record>, RealError> {
         self.draws().get(part).map_or_else(|| Ok(Vec::new()), |(name, seed)| self.draw(name, *seed))
     }
 

@@ -15,10 +15,11 @@ pub mod measured;
 pub mod printed;
 mod publish;
 pub mod record;
+pub mod recording;
 mod stage;
 pub mod way;
 
-pub use lab::{LabError, LabStudy};
+pub use lab::{LabStudy, RealError};
 pub use measured::{Measured, Unmeasured};
 pub use record::{Draw, Record, Summary};
 pub use way::{Estimator, Quantity, Way};

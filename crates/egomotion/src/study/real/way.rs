@@ -38,6 +38,8 @@ pub enum Quantity {
     Vz,
     /// VZ in mm per frame wherever something was measured, depth edges and wrong matches too.
     VzAnywhere,
+    /// VZ in mm per frame against what the true φ does to the measured depth of a still scene.
+    VzStill,
     /// tX in mm per frame.
     Tx,
     /// tY in mm per frame.
@@ -65,6 +67,7 @@ impl Quantity {
         match self {
             Self::Vz => "vz",
             Self::VzAnywhere => "vz_anywhere",
+            Self::VzStill => "vz_still",
             Self::Tx => "tx",
             Self::Ty => "ty",
             Self::Tz => "tz",
@@ -79,7 +82,7 @@ impl Quantity {
     /// Symbol and unit.
     pub fn heading(self) -> &'static str {
         match self {
-            Self::Vz | Self::VzAnywhere => "VZ (mm)",
+            Self::Vz | Self::VzAnywhere | Self::VzStill => "VZ (mm)",
             Self::Tx => "tX (mm)",
             Self::Ty => "tY (mm)",
             Self::Tz => "tZ (mm)",
@@ -106,8 +109,8 @@ impl Way {
         let contender =
             Contender { approach: self.approach, method: self.method, estimator: EstimatorKind::Ls };
         let estimator = match self.estimator {
-            Estimator::Pixel => "",
-            Estimator::Ls => "ls",
+            // It stands with least squares.
+            Estimator::Pixel | Estimator::Ls => "ls",
             Estimator::Lmeds => "lmeds",
             Estimator::Ml => "ml",
         };

@@ -15,7 +15,7 @@ pub(super) fn estimators(results: &Results<'_>) -> Table {
          better one. Last row: maximum likelihood over the best of all the others in each sequence.",
         &columns(&[("approach", "approach"), ("method", "method")]),
     );
-    let eam = |letter: &str, way, quantity| results.get(letter, Some(way), quantity).map(|found| found.eam);
+    let eam = |name: &str, way, quantity| results.get(name, Some(way), quantity).map(|found| found.eam);
     let all: Vec<Way> = [Approach::Differential, Approach::Discrete]
         .into_iter()
         .flat_map(ways)
@@ -28,16 +28,16 @@ pub(super) fn estimators(results: &Results<'_>) -> Table {
                 results
                     .letters()
                     .into_iter()
-                    .filter_map(|letter| Some(eam(letter, lmeds, quantity)? / eam(letter, *ls, quantity)?)),
+                    .filter_map(|name| Some(eam(name, lmeds, quantity)? / eam(name, *ls, quantity)?)),
             )
         };
         let [approach, method, _] = ls.names();
         table.rows.push(row([approach, method], Quantity::PHI.map(ratio)));
     }
     let best = |quantity| {
-        geometric_mean(results.letters().into_iter().filter_map(|letter| {
-            let others = all.iter().filter_map(|way| eam(letter, *way, quantity));
-            Some(eam(letter, Way::BEST, quantity)? / others.min_by(f64::total_cmp)?)
+        geometric_mean(results.sequences().into_iter().filter_map(|name| {
+            let others = all.iter().filter_map(|way| eam(name, *way, quantity));
+            Some(eam(name, Way::BEST, quantity)? / others.min_by(f64::total_cmp)?)
         }))
     };
     table.rows.push(row(["discrete", "ml / best of the others"], Quantity::PHI.map(best)));

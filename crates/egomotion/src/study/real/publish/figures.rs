@@ -1,9 +1,10 @@
 //! Figures 11 to 14, the paper's values as marks beside our lines.
 
-use super::Results;
 use super::data::speed;
+use super::{Results, lab_name};
 use crate::pipeline::{Approach, Method};
 use crate::sim::Sequence;
+use crate::study::real::lab::LabStudy;
 use crate::study::real::printed::{TABLE_3, TABLE_6, TABLE_7, TABLES_4_5};
 use crate::study::real::record::in_mm_deg;
 use crate::study::real::way::{Estimator, Quantity, Way};
@@ -15,8 +16,8 @@ const PATHS: [&[&str]; 2] = [&["E", "F", "G", "H", "I"], &["A", "B", "C", "D"]];
 const SHOWN: &str = "lab-G";
 
 /// Figures 11 to 14.
-pub(super) fn all(results: &Results<'_>) -> Vec<Figure> {
-    let mut figures: Vec<Figure> = images(results).into_iter().collect();
+pub(super) fn all(study: &LabStudy, results: &Results<'_>) -> Vec<Figure> {
+    let mut figures: Vec<Figure> = images(study).into_iter().collect();
     figures.push(Figure {
         id: "figure-12".to_owned(),
         title: "Figure 12. ERM of VZ against speed".to_owned(),
@@ -44,8 +45,8 @@ pub(super) fn all(results: &Results<'_>) -> Vec<Figure> {
     figures
 }
 
-fn images(results: &Results<'_>) -> Option<Figure> {
-    let (frames, measured) = results.study.example(SHOWN)?;
+fn images(study: &LabStudy) -> Option<Figure> {
+    let (frames, measured) = study.example(SHOWN)?;
     let [_, now, _] = frames;
     let disparity = measured.rounded[1].shift.clone();
     let known = disparity.grid().values().iter().copied().filter(|d| d.is_finite());
@@ -94,7 +95,7 @@ fn series(
 ) -> Series {
     let point = |letter: &&str| {
         let (y, standard_error) = value(letter)?;
-        Some(Point { x: speed(&format!("lab-{letter}"))?, y, standard_error })
+        Some(Point { x: speed(&lab_name(letter))?, y, standard_error })
     };
     Series { name, line, points: PATHS[path].iter().filter_map(point).collect() }
 }
@@ -110,7 +111,7 @@ fn vz(results: &Results<'_>, path: usize) -> Panel {
     ];
     let measured = |way: Way| {
         series(name(way).to_owned(), Line::Solid, path, |letter| {
-            let found = results.get(letter, Some(way), Quantity::Vz)?;
+            let found = results.lab(letter, Some(way), Quantity::Vz)?;
             // The standard error of a signed mean that hovers about zero says little of its size.
             if path == 0 {
                 Some((found.erm_signed?.abs(), None))
@@ -148,7 +149,7 @@ fn phi(results: &Results<'_>, path: usize, i: usize, quantity: Quantity) -> Pane
     let relative = (path == 0 && quantity == Quantity::Tz) || (path == 1 && quantity == Quantity::Wy);
     let measured = |way: Way| {
         series(name(way).to_owned(), Line::Solid, path, |letter| {
-            let found = results.get(letter, Some(way), quantity)?;
+            let found = results.lab(letter, Some(way), quantity)?;
             let y = if relative { found.erm_abs? } else { found.eam };
             Some((y, found.standard_error))
         })
@@ -161,8 +162,7 @@ fn phi(results: &Results<'_>, path: usize, i: usize, quantity: Quantity) -> Pane
                 _ => TABLE_7.iter().find(|row| row.0 == letter)?.1[i],
             };
             let truth =
-                in_mm_deg(&Sequence::named(&format!("lab-{letter}"), None, Some(2), 1.0)?.phi_cyclopean(0)?)
-                    [i];
+                in_mm_deg(&Sequence::named(&lab_name(letter), None, Some(2), 1.0)?.phi_cyclopean(0)?)[i];
             let error = (value - truth).abs();
             Some((if relative { 100.0 * error / truth.abs() } else { error }, None))
         })

@@ -1,6 +1,6 @@
 //! Tables 3 to 7 in the paper's form, its own values beside ours.
 
-use super::Results;
+use super::{Results, lab_name};
 use crate::pipeline::{Approach, Method};
 use crate::sim::Sequence;
 use crate::study::real::printed::{MmDeg, PrintedVz, TABLE_3, TABLE_6, TABLE_7, TABLES_4_5};
@@ -17,7 +17,7 @@ pub(super) fn matching(results: &Results<'_>) -> Table {
         &[("sequence", "sequence"), ("disparity_px", "disparity (px)"), ("flow_px", "flow (px)")],
     );
     for letter in results.letters() {
-        let median = |quantity| results.get(letter, None, quantity).map(|found| found.estimate);
+        let median = |quantity| results.lab(letter, None, quantity).map(|found| found.estimate);
         table.rows.push(vec![
             letter.into(),
             median(Quantity::Disparity).into(),
@@ -103,7 +103,7 @@ fn vz(results: &Results<'_>, (id, title): (&str, &str), approach: Approach, prin
         cells.extend(pair(row.erm_percent).into_iter().chain(pair(row.std_percent)));
         table.rows.push(cells);
         for (source, quantity) in [("here", Quantity::Vz), ("here, anywhere", Quantity::VzAnywhere)] {
-            let found = ways.map(|way| results.get(row.letter, Some(way), quantity));
+            let found = ways.map(|way| results.lab(row.letter, Some(way), quantity));
             let each = |value: fn(&Summary) -> Option<f64>| {
                 found.each_ref().map(|found| Cell::from(found.as_ref().and_then(value)))
             };
@@ -149,7 +149,7 @@ fn phi(
         for way in ways(approach) {
             let mut cells: Vec<Cell> = vec![letter.into(), way.label().into()];
             cells.extend(
-                Quantity::PHI.map(|quantity| measured(results.get(letter, Some(way), quantity), quantity)),
+                Quantity::PHI.map(|quantity| measured(results.lab(letter, Some(way), quantity), quantity)),
             );
             table.rows.push(cells);
         }
@@ -160,7 +160,7 @@ fn phi(
 /// The truth and what the paper prints for one sequence.
 fn printed_rows(letter: &str, approach: Approach) -> Vec<(&'static str, MmDeg)> {
     let mut rows = Vec::new();
-    let sequence = Sequence::named(&format!("lab-{letter}"), None, Some(2), 1.0);
+    let sequence = Sequence::named(&lab_name(letter), None, Some(2), 1.0);
     rows.extend(sequence.and_then(|s| s.phi_cyclopean(0)).map(|phi| ("exact", in_mm_deg(&phi))));
     if approach == Approach::Differential {
         for row in TABLES_4_5.iter().filter(|row| row.letter == letter) {
@@ -183,7 +183,7 @@ pub(super) fn ways(approach: Approach) -> Vec<Way> {
 }
 
 /// Mean ± scatter, with as many digits as the paper prints.
-fn measured(found: Option<Summary>, quantity: Quantity) -> Cell {
+pub(super) fn measured(found: Option<Summary>, quantity: Quantity) -> Cell {
     let Some(found) = found else { return Cell::Empty };
     let digits = if matches!(quantity, Quantity::Tx | Quantity::Ty | Quantity::Tz) { 2 } else { 3 };
     // One digit more where the scatter would vanish.
