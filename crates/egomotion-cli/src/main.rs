@@ -1,6 +1,7 @@
 //! The command `egomotion`.
 
 mod args;
+mod chart;
 mod demo;
 mod evaluate;
 mod feed;
@@ -10,6 +11,8 @@ mod report;
 mod results;
 mod run;
 mod session;
+#[expect(dead_code, reason = "no study of the library is wired to it yet")]
+mod study;
 mod summary;
 mod terminal;
 
