@@ -10,8 +10,10 @@ mod report;
 mod results;
 mod run;
 mod session;
+mod simulate;
 mod summary;
 mod terminal;
+mod toml_file;
 
 use std::process::ExitCode;
 
@@ -44,6 +46,7 @@ fn main() -> ExitCode {
     let ending = match &cli.command {
         Command::Demo(args) => demo::demo(args),
         Command::Run(args) => run::run(args),
+        Command::Simulate(args) => simulate::simulate(args),
         Command::Evaluate(args) => evaluate::evaluate(args),
         Command::Info(args) => info::info(args),
     };
