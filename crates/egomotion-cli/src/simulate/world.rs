@@ -105,8 +105,12 @@ fn clear_frames(sequence: &Sequence, asked: Option<usize>) -> Result<usize> {
     let blocked = |k: &usize| !sequence.clearance_m(*k).is_some_and(|clearance| clearance > 0.0);
     match (0..frames).find(blocked) {
         None => Ok(frames),
-        Some(k @ (0 | 1)) => Err(Usage(format!(
-            "frame {k} of {name}: a camera is outside the room or inside a part of the scene; take a smaller --step"
+        // Every sequence starts at the world's origin.
+        Some(0) => Err(anyhow!(
+            "frame 0 of {name}: a camera is outside the room or inside a part; leave the scene's origin clear"
+        )),
+        Some(1) => Err(Usage(format!(
+            "frame 1 of {name}: a camera would leave the room or enter a part of the scene; take a smaller --step"
         ))
         .into()),
         Some(k) => {
@@ -120,8 +124,8 @@ fn clear_frames(sequence: &Sequence, asked: Option<usize>) -> Result<usize> {
     }
 }
 
-/// Pixels of the largest image that is rendered, 2²⁶.
-const MAX_PIXELS: usize = 1 << 26;
+/// Pixels of the largest image that is rendered, 2²⁵: 8K is one.
+const MAX_PIXELS: usize = 1 << 25;
 
 /// Whether images of this size can be rendered and kept.
 pub fn check_size((width, height): (usize, usize)) -> Result<(), String> {
