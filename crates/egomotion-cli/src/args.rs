@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use crate::simulate::check_size;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
+
+use crate::simulate::check_size;
 
 /// 3D motion, depth velocity and time to impact from stereo, each with an uncertainty that can be trusted.
 #[derive(Debug, Parser)]
@@ -179,7 +180,8 @@ pub struct InfoArgs {
     pub source: PathBuf,
 }
 
-fn positive(text: &str) -> Result<usize, String> {
+/// A whole number of at least 1.
+pub fn positive(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) => Err("must be at least 1".into()),
         Ok(n) => Ok(n),

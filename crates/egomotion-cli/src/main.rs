@@ -1,6 +1,7 @@
 //! The command `egomotion`.
 
 mod args;
+mod chart;
 mod demo;
 mod evaluate;
 mod feed;
@@ -11,6 +12,8 @@ mod results;
 mod run;
 mod session;
 mod simulate;
+#[expect(dead_code, reason = "no study of the library is wired to it yet")]
+mod study;
 mod summary;
 mod terminal;
 mod toml_file;

@@ -47,6 +47,11 @@ impl ResultFolder {
         Ok(Self { path: path.to_owned() })
     }
 
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Write one file.
     pub fn write(&self, name: &str, content: &[u8]) -> Result<()> {
         Ok(write::bytes(&self.path.join(name), content)?)

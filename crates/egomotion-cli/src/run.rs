@@ -173,22 +173,13 @@ fn run_sequence(
     let about = About {
         title: &sequence.name,
         source: &summary.source,
-        command: command_line(),
+        command: terminal::command_line(),
         config,
         rig: &rig,
         notes: notes(&summary),
     };
     folder.write_report(&about, &outcome)?;
     Ok(DoneSequence { summary, first_failure })
-}
-
-/// The command that repeats this run.
-fn command_line() -> String {
-    let word = |word: std::ffi::OsString| {
-        let word = word.to_string_lossy().into_owned();
-        if word.contains(char::is_whitespace) { format!("'{word}'") } else { word }
-    };
-    std::env::args_os().map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// What the report should say besides.

@@ -22,6 +22,15 @@ pub fn tell(message: impl std::fmt::Display) {
     let _ = writeln!(stderr(), "egomotion: {message}");
 }
 
+/// The command that repeats this run.
+pub fn command_line() -> String {
+    let word = |word: std::ffi::OsString| {
+        let word = word.to_string_lossy().into_owned();
+        if word.contains(char::is_whitespace) { format!("'{word}'") } else { word }
+    };
+    std::env::args_os().map(word).collect::<Vec<_>>().join(" ")
+}
+
 impl<W: Write> Write for Stream<W> {
     fn write(&mut self, bytes: &[u8]) -> Result<usize> {
         match self.0.write(bytes) {

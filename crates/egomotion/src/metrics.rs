@@ -157,9 +157,14 @@ impl SectionSeven {
     /// The relative figures count only points whose |truth| is at least 10 % of its 99th
     /// percentile, since a relative error means nothing where the truth passes through zero.
     pub fn of(pairs: &[(f64, f64)]) -> Option<Self> {
+        let truths: Vec<f64> =
+            pairs.iter().filter(|(e, t)| e.is_finite() && t.is_finite()).map(|(_, t)| t.abs()).collect();
+        Self::beyond(pairs, 0.1 * quantile(&truths, 0.99)?)
+    }
+
+    /// The same with a floor of its own: relative figures count only points whose |truth| reaches it.
+    pub fn beyond(pairs: &[(f64, f64)], floor: f64) -> Option<Self> {
         let known: Vec<_> = pairs.iter().copied().filter(|(e, t)| e.is_finite() && t.is_finite()).collect();
-        let truths: Vec<f64> = known.iter().map(|(_, t)| t.abs()).collect();
-        let floor = 0.1 * quantile(&truths, 0.99)?;
         let countable = known.iter().filter(|(_, t)| *t != 0.0 && t.abs() >= floor);
         let relative: Vec<f64> = countable.map(|(e, t)| 100.0 * (e - t) / t).collect();
         let errors: Vec<f64> = known.iter().map(|(e, t)| e - t).collect();

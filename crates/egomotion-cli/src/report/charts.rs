@@ -3,9 +3,9 @@
 use egomotion::metrics::quantile;
 use maud::{Markup, html};
 
-use super::number::{DEGREES, Unit, length};
-use super::plot::{Axes, MARGIN, Scale, band, extent, path};
 use super::{FrameRow, Report};
+use crate::chart::number::{DEGREES, Unit, length};
+use crate::chart::plot::{Axes, MARGIN, Scale, band, extent, path};
 
 /// Width and height of a small chart, in SVG units, which are pixels on a phone.
 const SIZE: (f64, f64) = (340.0, 190.0);

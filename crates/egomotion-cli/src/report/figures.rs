@@ -3,8 +3,8 @@
 use egomotion::metrics::{relative_pose_error, travelled_m};
 use maud::{Markup, html};
 
-use super::number::{count, length, significant};
 use super::{FrameRow, Report};
+use crate::chart::number::{count, length, significant};
 
 /// One figure: what it is, its value, and what else to know.
 struct Figure {

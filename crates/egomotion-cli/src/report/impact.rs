@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::Report;
 use super::charts::{clip_path, cursor, time_axes, unanswered, vertical, view_box};
-use super::plot::{Axes, Scale, extent, path};
+use crate::chart::plot::{Axes, Scale, extent, path};
 
 /// Width and height of the chart, in SVG units.
 const SIZE: (f64, f64) = (380.0, 375.0);

@@ -4,13 +4,10 @@
 //! goes on ([`Album`]), so that no maps are kept.
 
 mod charts;
-mod colour;
 mod figures;
 mod impact;
-mod number;
 mod page;
 mod pictures;
-mod plot;
 mod tables;
 #[cfg(test)]
 mod tests;

@@ -4,13 +4,14 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::colour::Spread;
-use super::number::{Unit, fixed, length, significant};
 use super::pictures::{FramePictures, QUANTITIES, Quantity};
-use super::plot::Scale;
 use super::{Report, charts, figures, impact, tables, trajectory};
+use crate::chart::PAGE_STYLE;
+use crate::chart::colour::Spread;
+use crate::chart::number::{Unit, fixed, length, significant};
+use crate::chart::plot::Scale;
 
-/// The style sheet.
+/// Rules for the parts of this page.
 const STYLE: &str = include_str!("style.css");
 /// Moves the slider; without it the page shows its first pictures.
 const SCRIPT: &str = include_str!("script.js");
@@ -28,7 +29,7 @@ pub fn render(report: &Report<'_>) -> String {
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta http-equiv="Content-Security-Policy" content=(POLICY);
                 title { (report.title) }
-                style { (PreEscaped(STYLE)) }
+                style { (PreEscaped(PAGE_STYLE)) (PreEscaped(STYLE)) }
             }
             body {
                 header {

@@ -5,7 +5,8 @@ use egomotion::geometry::{Grid, Image};
 use egomotion::metrics::quantile;
 use egomotion::pipeline::stereo::DenseResults;
 
-use super::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Rgb, Spread, VIRIDIS};
+use crate::chart::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Rgb, Spread, VIRIDIS};
+use crate::chart::raster::{encode, reduce};
 
 /// Greatest width of a picture, in pixels.
 const MOST_WIDTH_PX: usize = 480;
@@ -92,7 +93,7 @@ impl FramePictures {
 
 impl MapPicture {
     fn new(plane: &Grid<f32>, spread: Spread) -> Self {
-        let coordinates = reduce(plane, |block| {
+        let coordinates = reduce(plane, MOST_WIDTH_PX, |block| {
             let mut present: Vec<f64> = block.filter(|v| v.is_finite()).map(f64::from).collect();
             spread.coordinate(median(&mut present))
         });
@@ -124,7 +125,7 @@ impl MapPicture {
 
 /// Grey levels from black to the brightest, 8 bit; 64 levels, so that noise costs little.
 fn grey(image: &Image) -> Grid<u8> {
-    let mean = reduce(image, |block| {
+    let mean = reduce(image, MOST_WIDTH_PX, |block| {
         let (sum, n) = block.filter(|v| v.is_finite()).fold((0.0, 0), |(s, n), v| (s + f64::from(v), n + 1));
         sum / f64::from(n.max(1))
     });
@@ -133,40 +134,6 @@ fn grey(image: &Image) -> Grid<u8> {
     let white = if brightest <= 255.0 { 255.0 } else { brightest };
     let level = |v: f64| 4 * ((v / white).clamp(0.0, 1.0) * 63.0).round() as u8;
     Grid::from_fn(mean.width(), mean.height(), |u, v| level(mean.at(u, v)))
-}
-
-/// A plane of at most [`MOST_WIDTH_PX`] columns, each pixel made from the block it stands for.
-fn reduce(plane: &Grid<f32>, of_block: impl Fn(&mut dyn Iterator<Item = f32>) -> f64) -> Grid<f64> {
-    let (width, height) = plane.size();
-    let small = width.min(MOST_WIDTH_PX);
-    let rows = (height * small).div_ceil(width.max(1)).min(height);
-    let share = |i: usize, n: usize, of: usize| i * of / n.max(1)..((i + 1) * of).div_ceil(n.max(1));
-    Grid::from_fn(small, rows, |u, v| {
-        let columns = share(u, small, width);
-        of_block(&mut share(v, rows, height).flat_map(|y| columns.clone().map(move |x| plane.at(x, y))))
-    })
-}
-
-/// A grey PNG, or one in the colours of a palette whose entry 0 is transparent; `None` if it is empty.
-fn encode(pixels: &Grid<u8>, palette: Option<&[Rgb]>) -> Option<Vec<u8>> {
-    let (width, height) = (u32::try_from(pixels.width()).ok()?, u32::try_from(pixels.height()).ok()?);
-    let mut content = Vec::new();
-    let mut encoder = png::Encoder::new(&mut content, width, height);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Balanced);
-    if let Some(palette) = palette {
-        encoder.set_color(png::ColorType::Indexed);
-        encoder.set_palette([&[[0; 3]], palette].concat().as_flattened().to_vec());
-        encoder.set_trns(vec![0]);
-        // Neighbouring indices are not neighbouring numbers to a filter.
-        encoder.set_filter(png::Filter::NoFilter);
-    } else {
-        encoder.set_color(png::ColorType::Grayscale);
-    }
-    let mut writer = encoder.write_header().ok()?;
-    writer.write_image_data(pixels.values()).ok()?;
-    writer.finish().ok()?;
-    Some(content)
 }
 
 /// Pictures of at most [`MOST_PICTURES`] frames of a run whose length need not be known, evenly spaced.

@@ -2,8 +2,8 @@
 
 use maud::{Markup, html};
 
-use super::number::{DEGREES, fixed, length, significant, with_sigma};
 use super::{FrameRow, Report};
+use crate::chart::number::{DEGREES, fixed, length, significant, with_sigma};
 
 /// Most rows of the table; all are in `motion.csv`.
 const MOST_ROWS: usize = 1000;

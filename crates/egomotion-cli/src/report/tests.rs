@@ -274,7 +274,7 @@ fn a_map_comes_out_in_the_colours_of_its_bar() {
     reader.next_frame(&mut pixels).unwrap();
     let pixel = |u: usize| &pixels[4 * u..4 * u + 4];
     let near = |u: usize, share: f64| {
-        let expected = super::colour::VIRIDIS.at(share);
+        let expected = crate::chart::colour::VIRIDIS.at(share);
         pixel(u).iter().zip(expected).all(|(a, b)| a.abs_diff(b) < 8) && pixel(u)[3] == 255
     };
     assert!(near(0, 0.0) && near(2, 0.25) && near(4, 0.5), "{pixels:?}");

@@ -5,8 +5,8 @@ use maud::{Markup, html};
 use nalgebra::{Matrix2, Matrix6, Vector3};
 
 use super::Report;
-use super::number::length;
-use super::plot::{Axes, MARGIN, Scale, extent, path};
+use crate::chart::number::length;
+use crate::chart::plot::{Axes, MARGIN, Scale, extent, path};
 
 /// Width of the chart, in SVG units.
 const WIDTH: f64 = 380.0;

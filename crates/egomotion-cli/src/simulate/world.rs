@@ -129,7 +129,7 @@ const MAX_PIXELS: usize = 1 << 25;
 
 /// Whether images of this size can be rendered and kept.
 pub fn check_size((width, height): (usize, usize)) -> Result<(), String> {
-    let pixels = width.checked_mul(height).unwrap_or(usize::MAX);
+    let pixels = width.saturating_mul(height);
     match pixels {
         0 => Err("has no pixels".into()),
         _ if pixels > MAX_PIXELS => Err(format!("{width}x{height} is more than {MAX_PIXELS} pixels")),

@@ -33,7 +33,7 @@ pub fn solve(
     start: &Twist,
     config: &Config,
 ) -> Result<MotionEstimate, Unsolvable> {
-    let solver = Solver { rig, start, config, blocks: Blocks::over(rig, config.block_px) };
+    let solver = Solver::new(rig, start, config);
     let found = match (config.method, config.approach) {
         (Method::Ml, Approach::Discrete) => solver.likelihood(&solver.tracks(observed)),
         (Method::Ml, Approach::Differential) => solver.likelihood(&solver.flows(observed)),
@@ -46,14 +46,21 @@ pub fn solve(
     found?.known()
 }
 
-struct Solver<'a> {
+/// The methods on observations at hand, each with the configured estimator.
+#[derive(Debug, Clone, Copy)]
+pub struct Solver<'a> {
     rig: &'a StereoRig,
     start: &'a Twist,
     config: &'a Config,
     blocks: Blocks,
 }
 
-impl Solver<'_> {
+impl<'a> Solver<'a> {
+    /// Rows get their σ, and iterations their start, at the motion `start`.
+    pub fn new(rig: &'a StereoRig, start: &'a Twist, config: &'a Config) -> Self {
+        Self { rig, start, config, blocks: Blocks::over(rig, config.block_px) }
+    }
+
     fn tracks(&self, observed: &Observed<'_>) -> Vec<StereoTrack> {
         match observed {
             Observed::Sparse(tracks) => tracks.to_vec(),
@@ -106,7 +113,11 @@ impl Solver<'_> {
         LmedsOptions { seed: self.config.lmeds.seed ^ self.config.seed, ..self.config.lmeds }
     }
 
-    fn likelihood<M: Measurement>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
+    /// Maximum likelihood, its covariance with the part that all matches share.
+    ///
+    /// # Errors
+    /// [`Unsolvable`] when the observations do not determine a motion.
+    pub fn likelihood<M: Measurement>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
         let options = &self.config.maximum_likelihood;
         let blocks = Some(&self.blocks);
         let mut motion =
@@ -119,7 +130,11 @@ impl Solver<'_> {
         Ok(motion)
     }
 
-    fn depth_change(&self, changes: &[DepthChange]) -> Result<MotionEstimate, Unsolvable> {
+    /// DCCE, (12).
+    ///
+    /// # Errors
+    /// [`Unsolvable`] when the observations do not determine a motion.
+    pub fn depth_change(&self, changes: &[DepthChange]) -> Result<MotionEstimate, Unsolvable> {
         let rows: Vec<Row<6>> = changes
             .iter()
             .map(|change| {
@@ -140,7 +155,11 @@ impl Solver<'_> {
             .collect()
     }
 
-    fn binocular(&self, flows: &[StereoFlow]) -> Result<MotionEstimate, Unsolvable> {
+    /// Binocular flow in two steps, (14) then (3).
+    ///
+    /// # Errors
+    /// [`Unsolvable`] when the observations do not determine a motion.
+    pub fn binocular(&self, flows: &[StereoFlow]) -> Result<MotionEstimate, Unsolvable> {
         let dv: Vec<Row<6>> = flows
             .iter()
             .map(|flow| {
@@ -151,8 +170,11 @@ impl Solver<'_> {
         two_step(&dv, &self.flow_rows(flows), |rows| self.fit(rows))
     }
 
-    /// Rows in metres and in pixels only add up in units of their σ.
-    fn joint(&self, flows: &[StereoFlow]) -> Result<MotionEstimate, Unsolvable> {
+    /// Binocular flow and image flow at once: rows in metres and in pixels only add up in units of their σ.
+    ///
+    /// # Errors
+    /// [`Unsolvable`] when the observations do not determine a motion.
+    pub fn joint(&self, flows: &[StereoFlow]) -> Result<MotionEstimate, Unsolvable> {
         let mut rows = self.flow_rows(flows);
         rows.extend(flows.iter().map(|flow| {
             let constraint = binocular_flow::constraint(flow, self.rig, self.start);
@@ -166,7 +188,11 @@ impl Solver<'_> {
         Ok(fit.estimate(&rows))
     }
 
-    fn alignment(&self, tracks: &[StereoTrack], form: Form) -> Result<MotionEstimate, Unsolvable> {
+    /// Point pairs, (22), with a rotation or any matrix.
+    ///
+    /// # Errors
+    /// [`Unsolvable`] when the pairs do not determine a motion.
+    pub fn alignment(&self, tracks: &[StereoTrack], form: Form) -> Result<MotionEstimate, Unsolvable> {
         let pairs: Vec<PointPair> = tracks
             .iter()
             .filter_map(|track| {

@@ -18,7 +18,7 @@ pub use noise::{SensorError, SensorNoise};
 pub use render::{StereoImages, View};
 pub use scene::{Hit, Part, Scene};
 pub use scene_file::SceneError;
-pub use sequences::Sequence;
+pub use sequences::{Sequence, reference_pose};
 pub use shape::{Shape, Turn};
 pub use texture::Texture;
 pub use truth::{MotionTruth, PointTruth, field_of};

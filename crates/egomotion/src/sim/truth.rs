@@ -68,16 +68,23 @@ impl View<'_> {
         RigidMotion { rotation: self.world_from_cyclopean.rotation, translation }
     }
 
-    /// Truth at any place (u, v) of the left image, in pixels; `None` where it sees nothing.
-    pub fn truth_at(&self, u: f64, v: f64) -> Option<PointTruth> {
-        let (left, right) = self.eyes();
+    /// Position (x, y, d) in pixels and surface id at any place (u, v) of the left image; `None` where it sees nothing.
+    pub fn structure_at(&self, u: f64, v: f64) -> Option<(Vector3<f64>, u16)> {
+        let (left, _) = self.eyes();
         let hit = self.scene.cast(&left.origin, &left.direction(u, v))?;
         let (x, y) = self.rig.image_from_pixel(u, v);
-        let d = self.rig.disparity(hit.s)?;
-        let shift = self.rig.shift_from_disparity(d);
-        let in_right = inside(self.rig, u - shift, v) && self.scene.sees(&right.origin, &hit.point);
-        let point = Vector3::new(x, y, self.rig.focal_px) * (hit.s / self.rig.focal_px);
-        Some(PointTruth { point, xyd: Vector3::new(x, y, d), surface: hit.surface, in_right })
+        Some((Vector3::new(x, y, self.rig.disparity(hit.s)?), hit.surface))
+    }
+
+    /// Truth at any place (u, v) of the left image, in pixels; `None` where it sees nothing.
+    pub fn truth_at(&self, u: f64, v: f64) -> Option<PointTruth> {
+        let (xyd, surface) = self.structure_at(u, v)?;
+        let (_, right) = self.eyes();
+        let point = self.rig.point(&xyd)?;
+        let shift = self.rig.shift_from_disparity(xyd.z);
+        let seen = || self.scene.sees(&right.origin, &self.world_from_left().apply(&point));
+        let in_right = inside(self.rig, u - shift, v) && seen();
+        Some(PointTruth { point, xyd, surface, in_right })
     }
 
     /// Truth of every pixel centre of the left image.

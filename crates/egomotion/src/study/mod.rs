@@ -3,8 +3,13 @@
 //! A [`Study`] is a list of independent parts; each part gives records, and the records of all parts give
 //! tables and figures as plain values ([`Publication`]). Files, pages and progress are the command's.
 
+pub mod contender;
+pub mod draw;
 pub mod figure;
+pub mod sensitivity;
 pub mod table;
+pub mod tally;
+pub mod world;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use maud::{Markup, html};
 
-use super::number::fixed;
+use super::number::tick;
 
 /// From data to SVG units along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,7 @@ impl Scale {
 
     /// A logarithmic scale over a positive range.
     pub fn log((lo, hi): (f64, f64), to: (f64, f64)) -> Self {
-        let lo = if lo.is_finite() && lo > 1e-12 { lo } else { 1e-3 };
+        let lo = if lo.is_finite() && lo > 1e-290 { lo.min(1e290) } else { 1e-3 };
         let hi = if hi.is_finite() && hi > lo { hi } else { lo * 10.0 };
         Self { from: (lo, hi), to, log: true }
     }
@@ -63,7 +63,7 @@ impl Scale {
         let last = (hi / step).floor() as i64;
         (first..=last.min(first.saturating_add(50)))
             .map(|k| k as f64 * step)
-            .map(|v| (v, fixed(v, decimals)))
+            .map(|v| (v, tick(v, decimals)))
             .collect()
     }
 
@@ -75,7 +75,7 @@ impl Scale {
             let valued = all.map(|(s, e)| {
                 let decimals = (-e).max(0) as usize + usize::from(s.fract() > 0.0 && e <= 0);
                 let value = s * 10f64.powi(e);
-                (value, fixed(value, decimals))
+                (value, tick(value, decimals))
             });
             valued.filter(|(v, _)| (lo * 0.999..=hi * 1.001).contains(v)).collect()
         };

@@ -56,6 +56,35 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
+/// The label of a tick: with that many decimals, or as 2·10⁻⁶ where that would be long.
+pub fn tick(value: f64, decimals: usize) -> String {
+    let exponent = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    if value == 0.0 || (decimals <= 4 && exponent < 6) || !value.is_finite() {
+        return fixed(value, if value == 0.0 && decimals > 4 { 0 } else { decimals });
+    }
+    // Rounded first: 9.9999…·10⁻⁷ is 10⁻⁶.
+    let text = format!("{value:.2e}");
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.').replace('-', "−");
+    let power: String = exponent.chars().map(superscript).collect();
+    match mantissa.as_str() {
+        "1" => format!("10{power}"),
+        "−1" => format!("−10{power}"),
+        _ => format!("{mantissa}·10{power}"),
+    }
+}
+
+fn superscript(digit: char) -> char {
+    match digit {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '0' | '4'..='9' => char::from_u32(0x2070 + (u32::from(digit) - u32::from('0'))).unwrap_or(digit),
+        other => other,
+    }
+}
+
 /// `value ± sigma`, both with the decimals that show two digits of σ, at most six.
 pub fn with_sigma(value: f64, sigma: f64) -> String {
     if !(sigma.is_finite() && sigma > 0.0) {
@@ -84,6 +113,8 @@ mod tests {
         assert_eq!(with_sigma(-47.1234, 0.0213), "−47.123 ± 0.021");
         assert_eq!(with_sigma(1.5, f64::INFINITY), "1.500");
         assert_eq!(DEGREES.show(1.5, 2), "1.5°");
+        assert_eq!([tick(0.025, 3), tick(1e-6, 6), tick(-2.5e-12, 13)], ["0.025", "10⁻⁶", "−2.5·10⁻¹²"]);
+        assert_eq!([tick(0.0, 7), tick(9.999_999_999e-8, 8), tick(2e6, 0)], ["0", "10⁻⁷", "2·10⁶"]);
         assert_eq!(length(0.02).show(20.0, 2), "20\u{a0}mm");
     }
 }

@@ -1,0 +1,201 @@
+//! Running studies: part by part, with progress, until done or stopped; then their files and one page.
+
+use std::collections::BTreeSet;
+use std::io::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use anyhow::{Context, Result, anyhow};
+use egomotion::study::Study;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::journal::{Head, Journal, Parts};
+use super::page::{self, Chapter};
+use super::{figure, table};
+use crate::chart::number::count;
+use crate::results::ResultFolder;
+use crate::{Ending, terminal};
+
+/// Where studies are run, one after another; their results share a folder and a page.
+pub struct Laboratory {
+    folder: ResultFolder,
+    options: Options,
+    stop: Arc<AtomicBool>,
+    chapters: Vec<Chapter>,
+    /// Names of files that are taken, in lower case.
+    names: BTreeSet<String>,
+    interrupted: bool,
+}
+
+/// How studies are run.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Go on where an earlier run was stopped.
+    pub resume: bool,
+    /// Show no progress.
+    pub quiet: bool,
+    /// Headline of the page; that of the only study if there is none.
+    pub title: Option<String>,
+    /// The command that repeats the run.
+    pub command: String,
+}
+
+/// What a study has found.
+struct Found<R> {
+    /// Records of the parts that are done, in their order.
+    records: Vec<R>,
+    done: usize,
+    /// Why it ended before all parts were done.
+    failure: Option<anyhow::Error>,
+}
+
+impl Laboratory {
+    /// A laboratory with this folder; it stops after the running part once `stop` is set.
+    pub fn open(out: &Path, options: Options, stop: Arc<AtomicBool>) -> Result<Self> {
+        let folder = ResultFolder::create(out, false)?;
+        // The page's name is taken.
+        let names = BTreeSet::from([page::NAME.to_owned()]);
+        Ok(Self { folder, options, stop, chapters: Vec::new(), names, interrupted: false })
+    }
+
+    /// Run a study and write what it finds, also when it is stopped or a part fails.
+    pub fn run<S: Study>(&mut self, study: &S) -> Result<()> {
+        if self.interrupted || self.stop.load(Ordering::Relaxed) {
+            self.interrupted = true;
+            return Ok(());
+        }
+        let parts = study.parts();
+        let found = self.run_parts(study, &parts)?;
+        self.interrupted = found.failure.is_none() && found.done < parts.len();
+        self.publish(study, found.records, (found.done, parts.len()))?;
+        found.failure.map_or(Ok(()), Err)
+    }
+
+    fn run_parts<S: Study>(&self, study: &S, parts: &[String]) -> Result<Found<S::Record>> {
+        let (mut journal, mut known) = self.journal(study, parts)?;
+        let bar = self.progress(parts.len(), known.len());
+        let mut found = Found { records: Vec::new(), done: 0, failure: None };
+        for (k, part) in parts.iter().enumerate() {
+            if let Some(records) = known.remove(part) {
+                found.records.extend(records);
+                found.done += 1;
+                continue;
+            }
+            // What is known of later parts is shown too.
+            if found.failure.is_some() || self.stop.load(Ordering::Relaxed) {
+                continue;
+            }
+            bar.set_message(format!("{}: {part}", study.name()));
+            match study.run(k) {
+                Ok(records) => {
+                    // As they are read back, so that a resumed study differs in nothing.
+                    found.records.extend(journal.add(part, &records)?);
+                    found.done += 1;
+                    bar.inc(1);
+                }
+                Err(error) => {
+                    found.failure = Some(anyhow!(error).context(format!("study {}, {part}", study.name())));
+                }
+            }
+        }
+        bar.finish_and_clear();
+        Ok(found)
+    }
+
+    fn journal<S: Study>(&self, study: &S, parts: &[String]) -> Result<(Journal, Parts<S::Record>)> {
+        let path = self.folder.path().join(format!("{}.parts.jsonl", study.name()));
+        let settings = serde_json::to_value(study).context("the settings cannot be put into JSON")?;
+        let head = Head { version: env!("CARGO_PKG_VERSION").into(), study: study.name().into(), settings };
+        if !self.options.resume {
+            return Ok((Journal::begin(&path, &head)?, Parts::new()));
+        }
+        let (journal, known) = Journal::resume(&path, &head)?;
+        if let Some(name) = known.keys().find(|name| !parts.contains(name)) {
+            return Err(anyhow!(
+                "{}: holds the part {name}, which is not of this study any more; run without --resume to start anew",
+                path.display()
+            ));
+        }
+        Ok((journal, known))
+    }
+
+    /// A bar on a terminal, nothing in a pipe.
+    fn progress(&self, parts: usize, known: usize) -> ProgressBar {
+        if self.options.quiet {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(parts as u64).with_position(known as u64);
+        let template = "{wide_msg} {bar:30} {pos}/{len} parts, {eta} left";
+        bar.set_style(
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
+        bar.reset_eta();
+        bar.enable_steady_tick(Duration::from_millis(500));
+        bar
+    }
+
+    /// Write the files of a study, and the page anew.
+    fn publish<S: Study>(
+        &mut self,
+        study: &S,
+        records: Vec<S::Record>,
+        (done, parts): (usize, usize),
+    ) -> Result<()> {
+        let publication = study.publish(&records);
+        let settings = serde_json::to_string_pretty(study).context("the settings cannot be put into JSON")?;
+        let mut chapter =
+            Chapter { name: study.name(), publication, settings, done, parts, ..Chapter::default() };
+        let all = chapter.publication.data.iter().chain(&chapter.publication.tables);
+        for table in all {
+            let name = self.name(study.name(), &table.id, "csv");
+            self.folder.write(&name, &table::csv(table)?)?;
+            chapter.tables.push(name);
+        }
+        for figure in &chapter.publication.figures {
+            let name = self.name(study.name(), &figure.id, "svg");
+            self.folder.write(&name, figure::svg(figure).as_bytes())?;
+            chapter.figures.push(name);
+        }
+        self.chapters.push(chapter);
+        self.folder.write(page::NAME, page::render(&self.chapters, &self.options).as_bytes())
+    }
+
+    /// A name for a file that no other file of this laboratory has.
+    fn name(&mut self, study: &str, id: &str, extension: &str) -> String {
+        let plain = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_') { c } else { '-' };
+        let stem: String = id.chars().map(plain).collect();
+        let mut name = format!("{stem}.{extension}");
+        let mut k = 1;
+        while !self.names.insert(name.to_lowercase()) {
+            let number = if k > 1 { format!("-{k}") } else { String::new() };
+            name = format!("{study}-{stem}{number}.{extension}");
+            k += 1;
+        }
+        name
+    }
+
+    /// Say what was written, and how it ended.
+    pub fn close(self) -> Result<Ending> {
+        let figures = self.chapters.iter().map(|chapter| chapter.figures.len()).sum();
+        let tables = self.chapters.iter().map(|chapter| chapter.tables.len()).sum();
+        if !self.chapters.is_empty() {
+            writeln!(
+                terminal::stdout(),
+                "{}: {}, {}",
+                self.folder.path().join(page::NAME).display(),
+                count(figures, "figure", "figures"),
+                count(tables, "table", "tables"),
+            )?;
+        }
+        if !self.interrupted {
+            return Ok(Ending::Done);
+        }
+        let (done, parts) = self.chapters.iter().fold((0, 0), |sum, c| (sum.0 + c.done, sum.1 + c.parts));
+        terminal::tell(format_args!(
+            "stopped after {done} of {parts} parts; the same command with --resume goes on"
+        ));
+        Ok(Ending::Interrupted)
+    }
+}

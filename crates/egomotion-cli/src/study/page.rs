@@ -1,0 +1,169 @@
+//! `page.html`: what studies show, as one self-contained page.
+
+use egomotion::study::{Figure, Publication, Table};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::figure::Drawing;
+use super::laboratory::Options;
+use super::table;
+use crate::chart::PAGE_STYLE;
+use crate::chart::number::count;
+
+/// Its name in the folder of results.
+pub const NAME: &str = "page.html";
+/// Rules for the parts of this page.
+const STYLE: &str = include_str!("style.css");
+/// Nothing is loaded from anywhere, whatever the texts of a study say.
+const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'";
+
+/// One study of a page, with the names of its files.
+#[derive(Default)]
+pub struct Chapter {
+    pub name: &'static str,
+    pub publication: Publication,
+    /// Files of the data, then of the tables.
+    pub tables: Vec<String>,
+    /// Files of the figures.
+    pub figures: Vec<String>,
+    /// Settings as JSON.
+    pub settings: String,
+    /// Parts that are done, of how many.
+    pub done: usize,
+    pub parts: usize,
+}
+
+impl Chapter {
+    fn data(&self) -> impl Iterator<Item = (&Table, &String)> {
+        self.publication.data.iter().zip(&self.tables)
+    }
+
+    fn shown_tables(&self) -> impl Iterator<Item = (&Table, &String)> {
+        self.publication.tables.iter().zip(self.tables.iter().skip(self.publication.data.len()))
+    }
+
+    fn shown_figures(&self) -> impl Iterator<Item = (&Figure, &String)> {
+        self.publication.figures.iter().zip(&self.figures)
+    }
+}
+
+/// The whole page as one HTML document that loads nothing.
+pub fn render(chapters: &[Chapter], options: &Options) -> String {
+    let only = chapters.first().map_or("", |chapter| chapter.publication.title.as_str());
+    let title = options.title.as_deref().unwrap_or(only);
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                title { (title) }
+                style { (PreEscaped(PAGE_STYLE)) (PreEscaped(STYLE)) }
+            }
+            body {
+                header { h1 { (title) } }
+                main {
+                    (notes(chapters))
+                    (contents(chapters))
+                    @for chapter in chapters { (body(chapter, chapters.len() > 1)) }
+                    (repeat(chapters, options))
+                }
+                footer { "Made by egomotion " (env!("CARGO_PKG_VERSION")) ". Figures and tables are in files beside this page." }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// What is not done.
+fn notes(chapters: &[Chapter]) -> Markup {
+    let open: Vec<&Chapter> = chapters.iter().filter(|chapter| chapter.done < chapter.parts).collect();
+    html! {
+        @if !open.is_empty() {
+            ul class="notes" {
+                @for chapter in open {
+                    li { b { (chapter.name) } ": " (chapter.done) " of " (count(chapter.parts, "part is", "parts are")) " done. The same command with --resume does the rest." }
+                }
+            }
+        }
+    }
+}
+
+fn contents(chapters: &[Chapter]) -> Markup {
+    html! {
+        nav aria-label="contents" {
+            section {
+                h2 { "Contents" }
+                @for chapter in chapters {
+                    @if chapters.len() > 1 { h3 { a href=(format!("#{}", chapter.name)) { (chapter.publication.title) } } }
+                    ul class="contents" {
+                        @for (figure, file) in chapter.shown_figures() { li { a href=(format!("#{file}")) { (figure.title) } } }
+                        @for (table, file) in chapter.shown_tables() { li { a href=(format!("#{file}")) { (table.title) } } }
+                        @if !chapter.publication.data.is_empty() { li { a href=(format!("#{}-data", chapter.name)) { "Full results" } } }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn body(chapter: &Chapter, headed: bool) -> Markup {
+    html! {
+        @if headed { h2 class="chapter" id=(chapter.name) { (chapter.publication.title) } }
+        @for (figure, file) in chapter.shown_figures() { (one_figure(figure, file)) }
+        @for (table, file) in chapter.shown_tables() {
+            section id=(file) {
+                h2 { (table.title) }
+                @if !table.caption.is_empty() { p { (table.caption) } }
+                (table::html(table))
+                p class="small" { a href=(file) { (file) } }
+            }
+        }
+        @if !chapter.publication.data.is_empty() {
+            section id=(format!("{}-data", chapter.name)) {
+                h2 { "Full results" }
+                ul class="files" {
+                    @for (table, file) in chapter.data() {
+                        li { a href=(file) { (file) } ": " (table.title) ", " (count(table.rows.len(), "row", "rows")) ". " (table.caption) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn one_figure(figure: &Figure, file: &str) -> Markup {
+    let drawing = Drawing::new(figure, file.trim_end_matches(".svg"));
+    html! {
+        section id=(file) {
+            figure class="drawn" {
+                h2 { (figure.title) }
+                div class="paper" {
+                    @if !drawing.legend.is_empty() {
+                        ul class="keys" {
+                            @for (sample, name) in &drawing.legend { li { svg viewBox="0 0 30 12" aria-hidden="true" { (sample) } (name) } }
+                        }
+                    }
+                    div class="grid" style=(format!("--columns:{}", drawing.columns)) {
+                        (drawing.apart())
+                    }
+                }
+                figcaption { (figure.caption) }
+            }
+            p class="small" { a href=(file) { (file) } }
+        }
+    }
+}
+
+fn repeat(chapters: &[Chapter], options: &Options) -> Markup {
+    html! {
+        section {
+            h2 { "Once more" }
+            p { "The command that makes this page again, and all that was set." }
+            pre { code { (options.command) } }
+            @for chapter in chapters {
+                details { summary { "Settings of " (chapter.name) } pre { code { (chapter.settings) } } }
+            }
+        }
+    }
+}
