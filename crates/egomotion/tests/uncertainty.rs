@@ -102,9 +102,10 @@ fn product_of_two_noises() {
         let (first, corrected, place) = (&pair[0], &pair[1], pair[0].place.unwrap());
         assert_eq!((corrected.kind, corrected.place), (Kind::Corrected, first.place));
         let excess = corrected.predicted / first.predicted - 1.0;
-        // Reached where disparity has no gradient, so that flow's noise alone does nothing.
+        // Reached where disparity has no gradient g, so that flow's noise alone does nothing. The disparity
+        // that Zx and Zy share adds 8 g²/d² of it: 2 % where g is .5 px/px at d = 10 px.
         let most = 2.0 * place.sigma_flow_px.powi(2) / (1.0 + place.flow_px.powi(2));
-        assert!((0.0..=1.0001 * most).contains(&excess), "{excess} {most}");
+        assert!((0.0..=1.02 * most).contains(&excess), "{excess} {most}");
         let error = 5.0 * first.standard_error / first.predicted;
         missed += usize::from(first.ratio() - 1.0 > 0.006 + error);
         reached += usize::from(excess > 0.95 * most);
