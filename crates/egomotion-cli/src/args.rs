@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::study::StudyCommand;
 use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
 
 use crate::simulate::check_size;
@@ -35,6 +37,11 @@ pub enum Command {
     Evaluate(EvaluateArgs),
     /// Say what a source was recognised as: layout, frames, rig, time stamps, truth.
     Info(InfoArgs),
+    /// Repeat the paper's studies: files with every figure, and one page.
+    Study {
+        #[command(subcommand)]
+        command: StudyCommand,
+    },
 }
 
 #[derive(Debug, Args)]

@@ -12,7 +12,6 @@ mod results;
 mod run;
 mod session;
 mod simulate;
-#[expect(dead_code, reason = "no study of the library is wired to it yet")]
 mod study;
 mod summary;
 mod terminal;
@@ -52,6 +51,7 @@ fn main() -> ExitCode {
         Command::Simulate(args) => simulate::simulate(args),
         Command::Evaluate(args) => evaluate::evaluate(args),
         Command::Info(args) => info::info(args),
+        Command::Study { command } => study::study(command),
     };
     match ending {
         Ok(Ending::Done) => ExitCode::SUCCESS,

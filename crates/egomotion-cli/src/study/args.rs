@@ -2,9 +2,28 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 
 use crate::args::positive;
+
+/// The studies.
+#[derive(Debug, Subcommand)]
+pub enum StudyCommand {
+    /// One setting of the synthetic study alone: every method, approach and estimator.
+    Table(TableArgs),
+    /// The six sweeps of section 7.1, at both baselines: Figures 7, 8 and 9.
+    Sensitivity(SensitivityArgs),
+}
+
+/// The six sweeps.
+#[derive(Debug, Clone, Args)]
+pub struct SensitivityArgs {
+    /// The sequences [default: all of them].
+    #[arg(long, value_name = "NAME", ignore_case = true, value_delimiter = ',', value_parser = ["A", "B", "C"])]
+    pub sequence: Vec<String>,
+    #[command(flatten)]
+    pub laboratory: LaboratoryArgs,
+}
 
 /// What all studies take.
 #[derive(Debug, Clone, Args)]
@@ -42,7 +61,7 @@ impl LaboratoryArgs {
 #[derive(Debug, Clone, Args)]
 pub struct TableArgs {
     /// The sequence: A moves ahead, B turns, C does both.
-    #[arg(long, value_name = "NAME", ignore_case = true, value_parser = ["A", "B", "C"])]
+    #[arg(long, value_name = "NAME", value_parser = sequence)]
     pub sequence: String,
     /// STEP: the motion is so many times that of the sequence.
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = above_zero, allow_negative_numbers = true)]
@@ -60,12 +79,44 @@ pub struct TableArgs {
     pub laboratory: LaboratoryArgs,
 }
 
+/// The six sweeps.
+#[derive(Debug, Clone, Args)]
+pub struct SensitivityArgs {
+    /// The sequences; each is run once.
+    #[arg(
+        long = "sequence",
+        value_name = "NAME,…",
+        value_delimiter = ',',
+        default_values = SEQUENCES,
+        value_parser = sequence
+    )]
+    sequences: Vec<String>,
+    #[command(flatten)]
+    pub laboratory: LaboratoryArgs,
+}
+
+impl SensitivityArgs {
+    /// The sequences in their order, each once.
+    pub fn sequences(&self) -> Vec<String> {
+        let asked = |name: &&str| self.sequences.iter().any(|typed| typed == name);
+        SEQUENCES.into_iter().filter(asked).map(str::to_owned).collect()
+    }
+}
+
+/// The paper's sequences.
+const SEQUENCES: [&str; 3] = ["A", "B", "C"];
+
 /// Levels of disparity in a pixel; `None` where disparity is not rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Levels(pub Option<u32>);
 
 /// Fewer points do not determine any motion that a noise of one eighth of a pixel leaves standing.
 const LEAST_FEATURES: usize = 8;
+
+fn sequence(text: &str) -> Result<String, String> {
+    let known = SEQUENCES.into_iter().find(|name| name.eq_ignore_ascii_case(text));
+    known.map(str::to_owned).ok_or_else(|| "there are the sequences A, B and C".into())
+}
 
 fn number(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -111,6 +162,12 @@ mod tests {
         table: TableArgs,
     }
 
+    #[derive(Debug, Parser)]
+    struct TypedSweeps {
+        #[command(flatten)]
+        sweeps: SensitivityArgs,
+    }
+
     fn typed(options: &str) -> Result<TableArgs, String> {
         let words = std::iter::once("table").chain(options.split_whitespace());
         Typed::try_parse_from(words).map(|t| t.table).map_err(|e| {
@@ -133,10 +190,20 @@ mod tests {
     }
 
     #[test]
+    fn sequences_are_swept_once_each() {
+        let sequences = |words: &[&str]| {
+            TypedSweeps::try_parse_from([&["sensitivity"], words].concat()).map(|t| t.sweeps.sequences())
+        };
+        assert_eq!(sequences(&[]).unwrap(), ["A", "B", "C"]);
+        assert_eq!(sequences(&["--sequence", "c,A,C"]).unwrap(), ["A", "C"]);
+        assert_eq!(sequences(&["--sequence", "A,D"]).unwrap_err().exit_code(), 2);
+    }
+
+    #[test]
     fn what_has_no_meaning_is_refused_in_words() {
         for (options, words) in [
             ("", "--sequence <NAME>"),
-            ("--sequence Q", "'Q' for '--sequence <NAME>'\n  [possible values: A, B, C]"),
+            ("--sequence Q", "'Q' for '--sequence <NAME>': there are the sequences A, B and C"),
             ("--sequence A --step -1", "'-1' for '--step <S>': must be above 0"),
             ("--sequence A --step 0", "must be above 0"),
             ("--sequence A --step nan", "must be a number"),

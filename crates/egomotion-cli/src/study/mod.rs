@@ -13,12 +13,51 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Result;
+use egomotion::study::draw::Measuring;
+use egomotion::study::sensitivity::{OneSetting, Sensitivity};
 
 use crate::run::set_threads;
 use crate::{Ending, terminal};
 
-use args::LaboratoryArgs;
+pub use args::StudyCommand;
+use args::{LaboratoryArgs, SensitivityArgs, TableArgs};
 use laboratory::{Laboratory, Options};
+
+/// Run what was asked for.
+pub fn study(command: &StudyCommand) -> Result<Ending> {
+    match command {
+        StudyCommand::Table(args) => alone(&args.laboratory, &one_setting(args)),
+        StudyCommand::Sensitivity(args) => alone(&args.laboratory, &sensitivity(args)),
+    }
+}
+
+fn one_setting(args: &TableArgs) -> OneSetting {
+    OneSetting {
+        sequence: args.sequence.clone(),
+        step: args.step,
+        measuring: Measuring {
+            round: args.round.0,
+            std_disp_px: args.std,
+            std_vel_px: args.std,
+            std_track_px: args.std,
+            features: args.features,
+        },
+        draws: args.laboratory.draws.unwrap_or(DRAWS),
+        seed: args.laboratory.seed,
+    }
+}
+
+fn sensitivity(args: &SensitivityArgs) -> Sensitivity {
+    let mut study = Sensitivity { seed: args.laboratory.seed, ..Sensitivity::default() };
+    if !args.sequence.is_empty() {
+        study.sequences.retain(|name| args.sequence.contains(name));
+    }
+    study.draws = args.laboratory.draws.unwrap_or(study.draws);
+    study
+}
+
+/// Draws of a single setting where none are asked for.
+const DRAWS: usize = 40;
 
 /// Run one study into its folder.
 fn alone<S: egomotion::study::Study>(args: &LaboratoryArgs, study: &S) -> Result<Ending> {

@@ -9,6 +9,7 @@ pub mod figure;
 pub mod sensitivity;
 pub mod table;
 pub mod tally;
+pub mod uncertainty;
 pub mod world;
 
 use serde::Serialize;

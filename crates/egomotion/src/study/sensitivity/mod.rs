@@ -138,7 +138,6 @@ pub struct Record {
     /// The swept parameter's value, `inf` for no rounding; STEP for a single setting.
     pub value: String,
     /// Who, what, and how wrong.
-    #[serde(flatten)]
     pub score: Score,
 }
 
