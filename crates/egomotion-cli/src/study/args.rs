@@ -13,16 +13,10 @@ pub enum StudyCommand {
     Table(TableArgs),
     /// The six sweeps of section 7.1, at both baselines: Figures 7, 8 and 9.
     Sensitivity(SensitivityArgs),
-}
-
-/// The six sweeps.
-#[derive(Debug, Clone, Args)]
-pub struct SensitivityArgs {
-    /// The sequences [default: all of them].
-    #[arg(long, value_name = "NAME", ignore_case = true, value_delimiter = ',', value_parser = ["A", "B", "C"])]
-    pub sequence: Vec<String>,
-    #[command(flatten)]
-    pub laboratory: LaboratoryArgs,
+    /// Section 5: the table under (51), Figures 3 to 6, and every variance formula against draws.
+    Uncertainty(LaboratoryArgs),
+    /// Every study, with one page that links them.
+    All(LaboratoryArgs),
 }
 
 /// What all studies take.

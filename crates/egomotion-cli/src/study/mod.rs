@@ -15,19 +15,30 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Result;
 use egomotion::study::draw::Measuring;
 use egomotion::study::sensitivity::{OneSetting, Sensitivity};
+use egomotion::study::uncertainty::Uncertainty;
 
 use crate::run::set_threads;
 use crate::{Ending, terminal};
 
 pub use args::StudyCommand;
-use args::{LaboratoryArgs, SensitivityArgs, TableArgs};
+use args::{LaboratoryArgs, TableArgs};
 use laboratory::{Laboratory, Options};
 
 /// Run what was asked for.
 pub fn study(command: &StudyCommand) -> Result<Ending> {
     match command {
         StudyCommand::Table(args) => alone(&args.laboratory, &one_setting(args)),
-        StudyCommand::Sensitivity(args) => alone(&args.laboratory, &sensitivity(args)),
+        StudyCommand::Sensitivity(args) => {
+            alone(&args.laboratory, &sensitivity(&args.laboratory, args.sequences()))
+        }
+        StudyCommand::Uncertainty(args) => alone(args, &uncertainty(args)),
+        StudyCommand::All(args) => {
+            let mut laboratory = open(args, None, Some("The paper's studies, repeated"))?;
+            // Its draws are of another kind and number.
+            laboratory.run(&uncertainty(&LaboratoryArgs { draws: None, ..args.clone() }))?;
+            laboratory.run(&sensitivity(args, Sensitivity::default().sequences))?;
+            laboratory.close()
+        }
     }
 }
 
@@ -47,13 +58,14 @@ fn one_setting(args: &TableArgs) -> OneSetting {
     }
 }
 
-fn sensitivity(args: &SensitivityArgs) -> Sensitivity {
-    let mut study = Sensitivity { seed: args.laboratory.seed, ..Sensitivity::default() };
-    if !args.sequence.is_empty() {
-        study.sequences.retain(|name| args.sequence.contains(name));
-    }
-    study.draws = args.laboratory.draws.unwrap_or(study.draws);
-    study
+fn sensitivity(args: &LaboratoryArgs, sequences: Vec<String>) -> Sensitivity {
+    let own = Sensitivity::default();
+    Sensitivity { sequences, draws: args.draws.unwrap_or(own.draws), seed: args.seed }
+}
+
+fn uncertainty(args: &LaboratoryArgs) -> Uncertainty {
+    let own = Uncertainty::default();
+    Uncertainty { draws: args.draws.unwrap_or(own.draws), seed: args.seed, ..own }
 }
 
 /// Draws of a single setting where none are asked for.

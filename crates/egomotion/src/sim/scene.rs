@@ -137,7 +137,37 @@ impl Scene {
         )
     }
 
+    /// A room like that of section 7.2, "two front walls and some objects": walls that meet in a corner 3.6 m
+    /// ahead, a table, boxes and balls 1 to 3 m away, so that the paper's rig sees disparities of 15 to 55 px.
+    ///
+    /// Its walls and its table have no ends, so that a camera inside sees a surface wherever it turns to
+    /// within 40°.
+    pub fn lab_room() -> Self {
+        let parts = [
+            // Left and right front wall, each given by its horizontal normal, and the table.
+            (Shape::plane([0.483_046, 0.0, -0.875_595], -3.007_228), 172.0, 0.0),
+            (Shape::plane([-0.756_801, 0.0, -0.653_645], -2.580_163), 150.0, 0.0),
+            (Shape::plane([0.0, -1.0, 0.0], -0.42), 128.0, 0.12),
+            // On the table, from near to far.
+            (Shape::turned_box([-0.28, 0.20, 1.25], [0.10, 0.22, 0.10], 25.0), 190.0, 0.0),
+            (Shape::sphere([0.12, 0.24, 1.60], 0.18), 205.0, 0.0),
+            (Shape::turned_box([0.55, 0.10, 2.10], [0.17, 0.32, 0.15], -20.0), 108.0, 0.0),
+            (Shape::turned_box([-0.62, 0.05, 2.30], [0.22, 0.37, 0.18], 35.0), 120.0, 0.0),
+            (Shape::sphere([0.02, 0.20, 2.75], 0.22), 160.0, 0.0),
+            // A ball on the right box, and a lamp's globe above.
+            (Shape::sphere([0.55, -0.36, 2.10], 0.14), 180.0, 0.0),
+            (Shape::sphere([-0.12, -0.45, 2.00], 0.13), 215.0, 0.0),
+        ];
+        Self::new(
+            parts.map(|(shape, grey, tile_m)| Part { shape, grey, tile_m }).to_vec(),
+            Vector3::new(0.5, -1.6, 0.4),
+            0.3,
+            2003,
+        )
+    }
+
     /// The same parts under the texture of another seed.
+    #[must_use]
     pub fn with_texture(self, seed: u64) -> Self {
         Self { texture: Texture::new(seed), ..self }
     }
@@ -274,6 +304,31 @@ mod tests {
         let box_faces = seen.iter().filter(|&&id| id / FACES == 5).count();
         assert_eq!(box_faces, 3, "{seen:?}");
         assert_eq!(seen.len(), 5 + box_faces, "{seen:?}");
+    }
+
+    #[test]
+    fn walls_of_the_lab_meet_at_its_corner_and_close_the_view() {
+        let scene = Scene::lab_room();
+        let corner = Vector3::new(0.3, 0.0, 3.6);
+        for wall in &scene.parts()[..2] {
+            assert!(wall.shape.clearance_m(&corner).abs() < 1e-5);
+        }
+        for degrees in -40..=40 {
+            let (x, z) = f64::from(degrees).to_radians().sin_cos();
+            let ahead = scene.cast(&Vector3::zeros(), &Vector3::new(x, -0.2, z)).unwrap();
+            assert!((1.0..4.0).contains(&ahead.s), "{degrees} {}", ahead.s);
+        }
+    }
+
+    #[test]
+    fn a_scene_with_another_texture_has_the_same_shapes() {
+        let (one, two) = (Scene::lab_room(), Scene::lab_room().with_texture(7));
+        let ray = Vector3::new(0.1, -0.1, 1.0);
+        let (a, b) = (one.cast(&Vector3::zeros(), &ray).unwrap(), two.cast(&Vector3::zeros(), &ray).unwrap());
+        assert_eq!(a, b);
+        let still = Vector3::zeros();
+        assert_ne!(one.grey(&a, &still, &still), two.grey(&b, &still, &still));
+        assert_eq!(one, two.with_texture(2003));
     }
 
     #[test]

@@ -16,6 +16,23 @@ const CONSTANT: [(&str, [f64; 6]); 5] = [
     ("still", [0.0; 6]),
 ];
 
+/// Constant motions of section 7.2 (Table 2, with the signs of Tables 4, 5 and 7), in [`Scene::lab_room`]; the
+/// paper has no K.
+const LAB: [(&str, [f64; 6]); 12] = [
+    ("lab-A", [0.0, 0.0, 0.0, 0.0, -0.25, 0.0]),
+    ("lab-B", [0.0, 0.0, 0.0, 0.0, -0.5, 0.0]),
+    ("lab-C", [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
+    ("lab-D", [0.0, 0.0, 0.0, 0.0, 2.0, 0.0]),
+    ("lab-E", [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]),
+    ("lab-F", [0.0, 0.0, -5.0, 0.0, 0.0, 0.0]),
+    ("lab-G", [0.0, 0.0, -10.0, 0.0, 0.0, 0.0]),
+    ("lab-H", [0.0, 0.0, -20.0, 0.0, 0.0, 0.0]),
+    ("lab-I", [0.0, 0.0, -40.0, 0.0, 0.0, 0.0]),
+    ("lab-J", [0.0, 5.0, -10.0, 0.0, 0.0, 0.0]),
+    ("lab-L", [0.0, 10.0, -20.0, 0.0, 0.0, 0.0]),
+    ("lab-M", [0.0, 5.0, -5.0, 0.0, 0.25, 0.0]),
+];
+
 /// Frames of a constant sequence where the caller does not say.
 const FRAMES: usize = 10;
 /// Frames of the demonstration: further ones would drive into the obstacle.
@@ -41,7 +58,12 @@ pub struct Sequence {
 impl Sequence {
     /// Every name that [`Sequence::named`] knows.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        CONSTANT.iter().map(|(name, _)| *name).chain(["demo"])
+        CONSTANT.iter().map(|(name, _)| *name).chain(["demo"]).chain(Self::lab_names())
+    }
+
+    /// The names of the manipulator's sequences, in the paper's order.
+    pub fn lab_names() -> impl Iterator<Item = &'static str> {
+        LAB.iter().map(|(name, _)| *name)
     }
 
     /// The sequence of that name (any case); `None` if there is none.
@@ -62,10 +84,15 @@ impl Sequence {
             let rig = rig(500.0 / 640.0, 0.16, size_px.unwrap_or((640, 480)))?;
             return Some(Self::new("demo", Scene::demo_room(), rig, DEMO_INTERVAL_S, motions));
         }
-        let (name, motion) = CONSTANT.iter().find(|(known, _)| known.eq_ignore_ascii_case(name))?;
+        let known = |list: &[(&'static str, [f64; 6])]| {
+            list.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).copied()
+        };
+        let paper = known(&CONSTANT).map(|found| (found, Scene::paper_room as fn() -> Scene));
+        let ((name, motion), scene) =
+            paper.or_else(|| known(&LAB).map(|found| (found, Scene::lab_room as _)))?;
         let motions =
-            vec![twist_from_mm_deg(motion).scaled(step); frames.unwrap_or(FRAMES).saturating_sub(1)];
-        Some(Self::new(name, Scene::paper_room(), paper_rig(size_px.unwrap_or((320, 240)))?, 1.0, motions))
+            vec![twist_from_mm_deg(&motion).scaled(step); frames.unwrap_or(FRAMES).saturating_sub(1)];
+        Some(Self::new(name, scene(), paper_rig(size_px.unwrap_or((320, 240)))?, 1.0, motions))
     }
 
     /// A sequence that starts at the world's origin and moves by `motions`: one frame more than motions.
@@ -165,6 +192,26 @@ mod tests {
         }
         assert!(Sequence::named("nothing", None, None, 1.0).is_none());
         assert!(Sequence::named("A", Some((0, 240)), None, 1.0).is_none());
+    }
+
+    #[test]
+    fn the_lab_is_clear_around_every_reference_pose_and_fills_the_image() {
+        assert_eq!(Sequence::lab_names().count(), 12);
+        for name in Sequence::lab_names() {
+            let sequence = Sequence::named(name, None, Some(2), 1.0).unwrap();
+            let phi = sequence.phi_cyclopean(0).unwrap();
+            for k in -3..=3 {
+                let view = View::new(&sequence.scene, &sequence.rig, reference_pose(&phi, k));
+                let (left, right) = view.eyes();
+                for eye in [left, right] {
+                    assert!(sequence.scene.clearance_m(&eye.origin) > 0.35, "{name} {k}");
+                }
+                for (u, v) in [(0.0, 0.0), (319.0, 0.0), (160.0, 120.0), (0.0, 239.0), (319.0, 239.0)] {
+                    let disparity = view.truth_at(u, v).unwrap().disparity_px();
+                    assert!((10.0..60.0).contains(&disparity), "{name} {k} {u} {v}: {disparity}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -6,6 +6,7 @@
 pub mod contender;
 pub mod draw;
 pub mod figure;
+pub mod real;
 pub mod sensitivity;
 pub mod table;
 pub mod tally;
