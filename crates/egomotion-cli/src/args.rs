@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
 
+use crate::study::StudyCommand;
+
 /// 3D motion, depth velocity and time to impact from stereo, each with an uncertainty that can be trusted.
 #[derive(Debug, Parser)]
 #[command(name = "egomotion", version, propagate_version = true, max_term_width = 100)]
@@ -22,6 +24,9 @@ pub enum Command {
     /// SOURCE is a folder in KITTI odometry layout (image_0, image_1, calib.txt, times.txt) or the
     /// training folder of KITTI 2012 or 2015, whose scenes are run one by one.
     Run(Box<RunArgs>),
+    /// Repeat the experiments of the paper: every figure as SVG, every table as CSV, and one page.
+    #[command(subcommand)]
+    Study(StudyCommand),
     /// Compare a trajectory with the truth, frame to frame and over lengths of path.
     Evaluate(EvaluateArgs),
     /// Say what a source was recognised as: layout, frames, rig, time stamps, truth.

@@ -11,7 +11,6 @@ mod report;
 mod results;
 mod run;
 mod session;
-#[expect(dead_code, reason = "no study of the library is wired to it yet")]
 mod study;
 mod summary;
 mod terminal;
@@ -47,6 +46,7 @@ fn main() -> ExitCode {
     let ending = match &cli.command {
         Command::Demo(args) => demo::demo(args),
         Command::Run(args) => run::run(args),
+        Command::Study(study) => study::study(study),
         Command::Evaluate(args) => evaluate::evaluate(args),
         Command::Info(args) => info::info(args),
     };

@@ -5,6 +5,7 @@ mod figure;
 mod journal;
 mod laboratory;
 mod page;
+mod real;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -17,8 +18,17 @@ use anyhow::Result;
 use crate::run::set_threads;
 use crate::{Ending, terminal};
 
+pub use args::StudyCommand;
+
 use args::LaboratoryArgs;
 use laboratory::{Laboratory, Options};
+
+/// Run what was typed.
+pub fn study(command: &StudyCommand) -> Result<Ending> {
+    match command {
+        StudyCommand::Real(args) => real::run(args),
+    }
+}
 
 /// Run one study into its folder.
 fn alone<S: egomotion::study::Study>(args: &LaboratoryArgs, study: &S) -> Result<Ending> {

@@ -26,7 +26,7 @@ pub(super) fn estimators(results: &Results<'_>) -> Table {
         let ratio = |quantity| {
             geometric_mean(
                 results
-                    .letters()
+                    .sequences()
                     .into_iter()
                     .filter_map(|name| Some(eam(name, lmeds, quantity)? / eam(name, *ls, quantity)?)),
             )
