@@ -20,7 +20,7 @@ pub(super) fn all(study: &LabStudy, results: &Results<'_>) -> Vec<Figure> {
     let mut figures: Vec<Figure> = images(study).into_iter().collect();
     figures.push(Figure {
         id: "figure-12".to_owned(),
-        title: "Figure 12. ERM of VZ against speed".to_owned(),
+        title: "Figure 12. ERM of VZ against speed (broken: the paper's values)".to_owned(),
         caption: "The size of the relative mean error of VZ at a pixel; translating it is that of the signed mean, turning the mean of \
                   absolute errors. Full lines are measured here, broken lines with open marks are the paper's Tables 3 and 6."
             .to_owned(),
@@ -28,8 +28,8 @@ pub(super) fn all(study: &LabStudy, results: &Results<'_>) -> Vec<Figure> {
         panels: [0, 1].map(|path| vz(results, path)).to_vec(),
     });
     let titles = [
-        ("figure-13", "Figure 13. Errors of φ against speed, translating"),
-        ("figure-14", "Figure 14. Errors of φ against speed, turning"),
+        ("figure-13", "Figure 13. Errors of φ against speed, translating (broken: the paper's values)"),
+        ("figure-14", "Figure 14. Errors of φ against speed, turning (broken: the paper's values)"),
     ];
     for (path, (id, title)) in titles.into_iter().enumerate() {
         figures.push(Figure {
