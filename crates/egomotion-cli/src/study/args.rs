@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 
+use egomotion::sim::Sequence;
+
 use crate::args::positive;
 
 /// The studies.
@@ -15,6 +17,11 @@ pub enum StudyCommand {
     Sensitivity(SensitivityArgs),
     /// Section 5: the table under (51), Figures 3 to 6, and every variance formula against draws.
     Uncertainty(LaboratoryArgs),
+    /// Section 7.2: Tables 3 to 7 and Figures 11 to 14, on the manipulator's sequences or on a recording.
+    ///
+    /// Without SOURCE the sequences lab-A … lab-M are rendered and go through the whole image pipeline. SOURCE is a
+    /// folder in KITTI odometry layout with true poses (poses.txt, or ../../poses/NAME.txt).
+    Real(RealArgs),
     /// Every study, with one page that links them.
     All(LaboratoryArgs),
 }
@@ -89,6 +96,42 @@ pub struct SensitivityArgs {
     pub laboratory: LaboratoryArgs,
 }
 
+/// Section 7.2 on images.
+#[derive(Debug, Clone, Args)]
+pub struct RealArgs {
+    /// Folder of a recording with true poses [default: the rendered sequences].
+    pub source: Option<PathBuf>,
+    /// The rendered sequences to use, such as lab-A,lab-E [default: all twelve].
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', conflicts_with = "source", value_parser = lab_name)]
+    pub sequences: Option<Vec<String>>,
+    /// Size of the rendered images.
+    #[arg(long, value_name = "WxH", default_value = "320x240", conflicts_with = "source", value_parser = size)]
+    pub size: (usize, usize),
+    /// STEP: frames of a rendered sequence between two images of a draw.
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "source", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub step: u32,
+    /// ROUND: levels of disparity in a pixel.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub round: u32,
+    /// φ is estimated from every N-th pixel in both directions [default: 2 rendered, 4 of a recording].
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub sample: Option<usize>,
+    /// Calibration of the recording to use in place of its own (KITTI calib.txt).
+    #[arg(long, value_name = "FILE", requires = "source")]
+    pub calibration: Option<PathBuf>,
+    /// First frame of the recording, counted from 0.
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "source")]
+    pub start: usize,
+    /// Number of frames of the recording to use.
+    #[arg(long, value_name = "N", default_value_t = 50, requires = "source")]
+    pub frames: usize,
+    /// Use every N-th frame of the recording.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "source", value_parser = positive)]
+    pub stride: usize,
+    #[command(flatten)]
+    pub laboratory: LaboratoryArgs,
+}
+
 impl SensitivityArgs {
     /// The sequences in their order, each once.
     pub fn sequences(&self) -> Vec<String> {
@@ -117,6 +160,21 @@ fn number(text: &str) -> Result<f64, String> {
         Ok(value) if value.is_finite() => Ok(value),
         _ => Err("must be a number".into()),
     }
+}
+
+fn lab_name(text: &str) -> Result<String, String> {
+    let known = Sequence::lab_names().find(|name| name.eq_ignore_ascii_case(text));
+    let all = || Sequence::lab_names().collect::<Vec<_>>().join(", ");
+    known.map(str::to_owned).ok_or_else(|| format!("must be of {}", all()))
+}
+
+/// Smaller images hold no patch that could be matched, larger ones no memory.
+const SIDES: std::ops::RangeInclusive<usize> = 64..=4096;
+
+fn size(text: &str) -> Result<(usize, usize), String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    let fits = |(w, h): &(usize, usize)| SIDES.contains(w) && SIDES.contains(h);
+    sides.filter(fits).ok_or_else(|| "must be WIDTHxHEIGHT, each 64 to 4096 pixels".into())
 }
 
 fn above_zero(text: &str) -> Result<f64, String> {
@@ -181,6 +239,37 @@ mod tests {
         assert_eq!(typed("--sequence A --round 0").unwrap().round, Levels(None));
         assert_eq!(args.laboratory.folder(Some("table")), Path::new("egomotion-out/study-table"));
         assert_eq!(args.laboratory.folder(None), Path::new("egomotion-out/study"));
+    }
+
+    #[derive(Debug, Parser)]
+    struct TypedReal {
+        #[command(flatten)]
+        real: RealArgs,
+    }
+
+    #[test]
+    fn section_7_2_is_rendered_or_recorded() {
+        let typed = |options: &str| {
+            let words = std::iter::once("real").chain(options.split_whitespace());
+            TypedReal::try_parse_from(words).map(|t| t.real).map_err(|e| e.to_string())
+        };
+        let args = typed("--sequences LAB-a,lab-M --size 640x480").unwrap();
+        assert_eq!(args.sequences.unwrap(), ["lab-A", "lab-M"]);
+        assert_eq!((args.size, args.step, args.round), ((640, 480), 1, 16));
+        let args = typed("drive/06 --frames 20 --stride 2").unwrap();
+        assert_eq!((args.source.unwrap().to_str(), args.frames, args.stride), (Some("drive/06"), 20, 2));
+        for (options, words) in [
+            ("--sequences lab-K", "must be of lab-A, lab-B"),
+            ("--size 320", "must be WIDTHxHEIGHT"),
+            ("--size 0x0", "must be WIDTHxHEIGHT"),
+            ("--step 0", "--step <N>"),
+            ("--step -1", "--step"),
+            ("--frames 5", "<SOURCE>"),
+            ("06 --sequences lab-A", "cannot be used with"),
+        ] {
+            let error = typed(options).expect_err(options);
+            assert!(error.contains(words), "{options}: {error}");
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@ mod figure;
 mod journal;
 mod laboratory;
 mod page;
+mod real;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -14,6 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Result;
 use egomotion::study::draw::Measuring;
+use egomotion::study::real::LabStudy;
 use egomotion::study::sensitivity::{OneSetting, Sensitivity};
 use egomotion::study::uncertainty::Uncertainty;
 
@@ -32,11 +34,13 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
             alone(&args.laboratory, &sensitivity(&args.laboratory, args.sequences()))
         }
         StudyCommand::Uncertainty(args) => alone(args, &uncertainty(args)),
+        StudyCommand::Real(args) => real::run(args),
         StudyCommand::All(args) => {
             let mut laboratory = open(args, None, Some("The paper's studies, repeated"))?;
             // Its draws are of another kind and number.
             laboratory.run(&uncertainty(&LaboratoryArgs { draws: None, ..args.clone() }))?;
             laboratory.run(&sensitivity(args, Sensitivity::default().sequences))?;
+            laboratory.run(&LabStudy { first_seed: args.seed, ..LabStudy::default() })?;
             laboratory.close()
         }
     }

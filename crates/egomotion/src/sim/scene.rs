@@ -145,18 +145,18 @@ impl Scene {
     pub fn lab_room() -> Self {
         let parts = [
             // Left and right front wall, each given by its horizontal normal, and the table.
-            (Shape::plane([0.483_046, 0.0, -0.875_595], -3.007_228), 172.0, 0.0),
+            (Shape::plane([0.483_046, 0.0, -0.875_595], -3.007_228), 165.0, 0.0),
             (Shape::plane([-0.756_801, 0.0, -0.653_645], -2.580_163), 150.0, 0.0),
             (Shape::plane([0.0, -1.0, 0.0], -0.42), 128.0, 0.12),
             // On the table, from near to far.
-            (Shape::turned_box([-0.28, 0.20, 1.25], [0.10, 0.22, 0.10], 25.0), 190.0, 0.0),
-            (Shape::sphere([0.12, 0.24, 1.60], 0.18), 205.0, 0.0),
+            (Shape::turned_box([-0.28, 0.20, 1.25], [0.10, 0.22, 0.10], 25.0), 145.0, 0.0),
+            (Shape::sphere([0.12, 0.24, 1.60], 0.18), 150.0, 0.0),
             (Shape::turned_box([0.55, 0.10, 2.10], [0.17, 0.32, 0.15], -20.0), 108.0, 0.0),
             (Shape::turned_box([-0.62, 0.05, 2.30], [0.22, 0.37, 0.18], 35.0), 120.0, 0.0),
-            (Shape::sphere([0.02, 0.20, 2.75], 0.22), 160.0, 0.0),
+            (Shape::sphere([0.02, 0.20, 2.75], 0.22), 140.0, 0.0),
             // A ball on the right box, and a lamp's globe above.
-            (Shape::sphere([0.55, -0.36, 2.10], 0.14), 180.0, 0.0),
-            (Shape::sphere([-0.12, -0.45, 2.00], 0.13), 215.0, 0.0),
+            (Shape::sphere([0.55, -0.36, 2.10], 0.14), 150.0, 0.0),
+            (Shape::sphere([-0.12, -0.45, 2.00], 0.13), 155.0, 0.0),
         ];
         Self::new(
             parts.map(|(shape, grey, tile_m)| Part { shape, grey, tile_m }).to_vec(),

@@ -56,7 +56,7 @@ impl Default for LabStudy {
     }
 }
 
-/// Why a part of the study cannot run.
+/// Why there are no records.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum RealError {
     /// There is no such sequence, or the images have no pixels.
@@ -68,6 +68,14 @@ pub enum RealError {
         width: usize,
         /// Height asked for, in pixels.
         height: usize,
+    },
+    /// The images are not of the rig's size.
+    #[error("the images are of {found:?} pixels, the rig of {expected:?}")]
+    Size {
+        /// (width, height) of the images.
+        found: (usize, usize),
+        /// (width, height) of the rig.
+        expected: (usize, usize),
     },
     /// Nothing could be measured.
     #[error(transparent)]

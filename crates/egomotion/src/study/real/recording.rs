@@ -1,6 +1,7 @@
 //! The same comparison on a real recording whose camera poses are known.
 
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::lab::RealError;
 use super::measured::Measured;
@@ -24,7 +25,7 @@ pub struct Triple {
 }
 
 /// How the frames of a recording are measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Measuring {
     /// ROUND: steps of disparity in a pixel.
     pub levels: u32,
@@ -51,6 +52,10 @@ impl Triple {
     /// [`RealError`] when the images differ in size or the rig cannot measure.
     pub fn records(&self, rig: &StereoRig, how: &Measuring) -> Result<Vec<Record>, RealError> {
         let [_, now, after] = &self.frames;
+        let (found, expected) = (now.left.size(), (rig.width_px, rig.height_px));
+        if found != expected {
+            return Err(RealError::Size { found, expected });
+        }
         let measured = Measured::new(&self.frames, rig, how.levels as f32)?;
         let best = estimates::best(now, after, rig)?;
         let mut ways = estimates::printed_ways(&measured, how.sample_step_px, how.seed);

@@ -26,7 +26,7 @@ pub(super) fn estimators(results: &Results<'_>) -> Table {
         let ratio = |quantity| {
             geometric_mean(
                 results
-                    .letters()
+                    .sequences()
                     .into_iter()
                     .filter_map(|name| Some(eam(name, lmeds, quantity)? / eam(name, *ls, quantity)?)),
             )
@@ -50,7 +50,7 @@ pub(super) fn consistency(results: &Results<'_>) -> Table {
         "real-consistency",
         "Whether the stated uncertainty of φ is true",
         "Root mean square over all draws of the error of φ in units of its stated standard deviation: 1 where it is true, \
-         more where bias or wrong matches are not accounted for.",
+         more where bias or wrong matches are not accounted for; the poses of a recording have errors of their own, which count too.",
         &columns(&[("approach", "approach"), ("method", "method"), ("estimator", "estimator")]),
     );
     let mut all: Vec<Way> = [Approach::Differential, Approach::Discrete].into_iter().flat_map(ways).collect();

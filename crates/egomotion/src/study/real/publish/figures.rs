@@ -1,4 +1,4 @@
-//! Figures 11 to 14, the paper's values as marks beside our lines.
+//! Figures 11 to 14, the paper's values as broken lines beside ours.
 
 use super::data::speed;
 use super::{Results, lab_name};
@@ -20,23 +20,24 @@ pub(super) fn all(study: &LabStudy, results: &Results<'_>) -> Vec<Figure> {
     let mut figures: Vec<Figure> = images(study).into_iter().collect();
     figures.push(Figure {
         id: "figure-12".to_owned(),
-        title: "Figure 12. ERM of VZ against speed".to_owned(),
+        title: "Figure 12. ERM of VZ against speed (broken: the paper's values)".to_owned(),
         caption: "The size of the relative mean error of VZ at a pixel; translating it is that of the signed mean, turning the mean of \
-                  absolute errors. Lines are measured here, marks are the paper's Tables 3 and 6."
+                  absolute errors. Full lines are measured here, broken lines with open marks are the paper's Tables 3 and 6."
             .to_owned(),
         columns: 2,
         panels: [0, 1].map(|path| vz(results, path)).to_vec(),
     });
     let titles = [
-        ("figure-13", "Figure 13. Errors of φ against speed, translating"),
-        ("figure-14", "Figure 14. Errors of φ against speed, turning"),
+        ("figure-13", "Figure 13. Errors of φ against speed, translating (broken: the paper's values)"),
+        ("figure-14", "Figure 14. Errors of φ against speed, turning (broken: the paper's values)"),
     ];
     for (path, (id, title)) in titles.into_iter().enumerate() {
         figures.push(Figure {
             id: id.to_owned(),
             title: title.to_owned(),
-            caption: "ERM where the true component is not zero, EAM where it is. Lines are the means over draws \
-                      measured here by least squares and by maximum likelihood, marks are the paper's Tables 4, 5 and 7."
+            caption: "ERM where the true component is not zero, EAM where it is. Full lines are the means over draws \
+                      measured here, by least squares and by maximum likelihood; broken lines with open marks are the paper's Tables 4, 5 \
+                      and 7."
                 .to_owned(),
             columns: 3,
             panels: Quantity::PHI.iter().enumerate().map(|(i, q)| phi(results, path, i, *q)).collect(),
@@ -123,7 +124,7 @@ fn vz(results: &Results<'_>, path: usize) -> Panel {
     let printed = |way: Way| {
         let table = if way.approach == diff { &TABLE_3 } else { &TABLE_6 };
         let which = usize::from(way.method == Method::Dv);
-        series(format!("{}, paper", name(way)), Line::Marks, path, |letter| {
+        series(name(way).to_owned(), Line::Dashed, path, |letter| {
             let row = table.iter().find(|row| row.letter == letter)?;
             Some((row.erm_percent[which].abs(), None))
         })
@@ -155,7 +156,7 @@ fn phi(results: &Results<'_>, path: usize, i: usize, quantity: Quantity) -> Pane
         })
     };
     let printed = |way: Way| {
-        series(format!("{}, paper", name(way)), Line::Marks, path, |letter| {
+        series(name(way).to_owned(), Line::Dashed, path, |letter| {
             let value = match way.method {
                 Method::Dcce => TABLES_4_5.iter().find(|row| row.letter == letter)?.dcce[i],
                 Method::Dv => TABLES_4_5.iter().find(|row| row.letter == letter)?.dv[i],

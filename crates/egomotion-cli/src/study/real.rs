@@ -1,0 +1,151 @@
+//! `egomotion study real`: section 7.2 on rendered sequences, or on a recording with true poses.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail};
+use egomotion::geometry::{RigidMotion, StereoRig, Twist};
+use egomotion::sim::StereoImages;
+use egomotion::study::real::recording::{Measuring, Triple, publish};
+use egomotion::study::real::{Draw, LabStudy, RealError, Record};
+use egomotion::study::{Publication, Study};
+use egomotion_io::source::{FrameFiles, Source};
+use egomotion_io::{IoError, image};
+use serde::Serialize;
+
+use super::alone;
+use super::args::RealArgs;
+use crate::{Ending, Usage};
+
+/// Pixels between two observations of φ in a recording.
+const SAMPLE_STEP_PX: usize = 4;
+
+/// Run what was typed.
+pub fn run(args: &RealArgs) -> Result<Ending> {
+    let Some(source) = &args.source else { return alone(&args.laboratory, &lab(args)) };
+    let recording = RecordingStudy::open(args, source.clone())?;
+    alone(&args.laboratory, &recording)
+}
+
+fn lab(args: &RealArgs) -> LabStudy {
+    let own = LabStudy::default();
+    LabStudy {
+        sequences: args.sequences.clone().unwrap_or(own.sequences),
+        width_px: args.size.0,
+        height_px: args.size.1,
+        step: args.step,
+        poses: own.poses,
+        seeds: args.laboratory.draws.map_or(own.seeds, |n| u32::try_from(n).unwrap_or(u32::MAX)),
+        first_seed: args.laboratory.seed,
+        levels: args.round,
+        sample_step_px: args.sample.unwrap_or(own.sample_step_px),
+    }
+}
+
+/// The frames of a recording, three at a time.
+#[derive(Debug, Serialize)]
+struct RecordingStudy {
+    source: PathBuf,
+    name: String,
+    rig: StereoRig,
+    how: Measuring,
+    stride: usize,
+    /// Numbers of the frames.
+    indices: Vec<usize>,
+    #[serde(skip)]
+    frames: Vec<(FrameFiles, RigidMotion)>,
+}
+
+impl RecordingStudy {
+    fn open(args: &RealArgs, path: PathBuf) -> Result<Self> {
+        let source = Source::open_with(&path, args.calibration.as_deref())?;
+        let name = path.display();
+        if source.layout.is_scene_set() {
+            bail!(
+                "{name}: has scenes of two frames; give a sequence with true poses, in KITTI odometry layout"
+            );
+        }
+        let sequence =
+            source.sequences.into_iter().next().with_context(|| format!("{name}: has no frames"))?;
+        let Some(rig) = sequence.rig else {
+            bail!("{name}: has no calibration; give one with --calibration FILE");
+        };
+        let chosen = sequence.frames.into_iter().skip(args.start).step_by(args.stride).take(args.frames);
+        let posed = |frame: FrameFiles| frame.truth.map(|pose| (frame, pose));
+        let all: Option<Vec<(FrameFiles, RigidMotion)>> = chosen.map(posed).collect();
+        let Some(frames) = all else {
+            bail!("{name}: has no true poses for these frames; put them beside the images as poses.txt");
+        };
+        if frames.len() < 3 {
+            let words = format!("{} frames are selected; a draw needs three", frames.len());
+            return Err(Usage(words).into());
+        }
+        Ok(Self {
+            source: path,
+            name: sequence.name,
+            rig,
+            how: Measuring {
+                levels: args.round,
+                sample_step_px: args.sample.unwrap_or(SAMPLE_STEP_PX),
+                seed: args.laboratory.seed,
+            },
+            stride: args.stride,
+            indices: frames.iter().map(|(frame, _)| frame.index).collect(),
+            frames,
+        })
+    }
+
+    /// The frames around the `k`-th one that has a neighbour on either side.
+    fn triple(&self, k: usize) -> Option<&[(FrameFiles, RigidMotion); 3]> {
+        self.frames.get(k..k + 3)?.try_into().ok()
+    }
+}
+
+/// Why a part of a recording gives no records.
+#[derive(Debug, thiserror::Error)]
+enum RecordingError {
+    #[error(transparent)]
+    Read(#[from] IoError),
+    #[error("{0}: the right image is missing")]
+    MissingRight(PathBuf),
+    #[error(transparent)]
+    Measure(#[from] RealError),
+}
+
+impl Study for RecordingStudy {
+    type Record = Record;
+    type Error = RecordingError;
+
+    fn name(&self) -> &'static str {
+        "recording"
+    }
+
+    fn parts(&self) -> Vec<String> {
+        let middle = self.frames.windows(3).map(|triple| format!("frame {}", triple[1].0.index));
+        middle.collect()
+    }
+
+    fn run(&self, part: usize) -> Result<Vec<Record>, RecordingError> {
+        let Some([a, b, c]) = self.triple(part) else { return Ok(Vec::new()) };
+        let triple = Triple {
+            frames: [read(&a.0)?, read(&b.0)?, read(&c.0)?],
+            motion: [scene_motion(&a.1, &b.1), scene_motion(&b.1, &c.1)],
+            draw: Draw { sequence: self.name.clone(), pose: b.0.index as i64, seed: self.how.seed },
+        };
+        Ok(triple.records(&self.rig, &self.how)?)
+    }
+
+    fn publish(&self, records: &[Record]) -> Publication {
+        publish(&self.name, records)
+    }
+}
+
+/// φ of the scene between two true camera poses.
+fn scene_motion(before: &RigidMotion, after: &RigidMotion) -> Twist {
+    after.inverse().after(before).log()
+}
+
+fn read(files: &FrameFiles) -> Result<StereoImages, RecordingError> {
+    let missing = || RecordingError::MissingRight(files.left.clone());
+    let right = files.right.as_ref().ok_or_else(missing)?;
+    Ok(StereoImages { left: image::read(&files.left)?, right: image::read(right)? })
+}
