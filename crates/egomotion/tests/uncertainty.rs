@@ -94,7 +94,7 @@ fn printed_variances_are_right_for_what_they_assume_only() {
 /// The product of gradient's and flow's noise: what first order misses, the corrected formula has.
 #[test]
 fn product_of_two_noises() {
-    let study = Uncertainty { settings: 6, ..small() };
+    let study = Uncertainty { settings: 16, ..small() };
     let (mut missed, mut reached) = (0, 0);
     let found = cases(&study, "DCCE differential (39)");
     for pair in found.windows(2).filter(|pair| pair[0].kind == Kind::FirstOrder && pair[0].relative() <= 0.02)
