@@ -79,7 +79,9 @@ impl World {
         let frames = clear_frames(&sequence, asked)?;
         if let Some(k) = (0..frames).find(|&k| looks_away(&sequence, k)) {
             let name = &sequence.name;
-            tell(format_args!("frame {k} of {name}: most of the image sees no surface, and is black"));
+            tell(format_args!(
+                "frame {k} of {name}: more than a quarter of the image sees no surface, and is black"
+            ));
         }
         Ok(Self { sequence, sensor, frames, step: args.step })
     }
@@ -128,7 +130,7 @@ fn clear_frames(sequence: &Sequence, asked: Option<usize>) -> Result<usize> {
     }
 }
 
-/// Whether fewer than half of an even grid of pixels see a surface at frame `k`.
+/// Whether more than a quarter of an even grid of pixels sees no surface at frame `k`.
 fn looks_away(sequence: &Sequence, k: usize) -> bool {
     const ACROSS: usize = 8;
     let Some(view) = sequence.view(k) else { return false };
@@ -137,7 +139,7 @@ fn looks_away(sequence: &Sequence, k: usize) -> bool {
         let (u, v) = (place(i % ACROSS, view.rig.width_px), place(i / ACROSS, view.rig.height_px));
         view.truth_at(u, v).is_some()
     };
-    2 * (0..ACROSS * ACROSS).filter(sees).count() < ACROSS * ACROSS
+    4 * (0..ACROSS * ACROSS).filter(sees).count() < 3 * ACROSS * ACROSS
 }
 
 /// Pixels of the largest image that is rendered, 2²⁵: 8K is one.
