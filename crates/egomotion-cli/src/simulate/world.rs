@@ -77,6 +77,12 @@ impl World {
         };
         let sensor = args.seed.map_or(sensor, |seed| sensor.with_seed(seed));
         let frames = clear_frames(&sequence, asked)?;
+        if let Some(k) = (0..frames).find(|&k| looks_away(&sequence, k)) {
+            let name = &sequence.name;
+            tell(format_args!(
+                "frame {k} of {name}: more than a quarter of the image sees no surface, and is black"
+            ));
+        }
         Ok(Self { sequence, sensor, frames, step: args.step })
     }
 
@@ -122,6 +128,18 @@ fn clear_frames(sequence: &Sequence, asked: Option<usize>) -> Result<usize> {
             Ok(k)
         }
     }
+}
+
+/// Whether more than a quarter of an even grid of pixels sees no surface at frame `k`.
+fn looks_away(sequence: &Sequence, k: usize) -> bool {
+    const ACROSS: usize = 8;
+    let Some(view) = sequence.view(k) else { return false };
+    let place = |i: usize, size: usize| (i as f64 + 0.5) / ACROSS as f64 * (size as f64 - 1.0);
+    let sees = |i: &usize| {
+        let (u, v) = (place(i % ACROSS, view.rig.width_px), place(i / ACROSS, view.rig.height_px));
+        view.truth_at(u, v).is_some()
+    };
+    4 * (0..ACROSS * ACROSS).filter(sees).count() < 3 * ACROSS * ACROSS
 }
 
 /// Pixels of the largest image that is rendered, 2²⁵: 8K is one.

@@ -249,6 +249,20 @@ fn a_drive_ends_before_the_wall() {
 }
 
 #[test]
+fn a_camera_that_turns_away_from_everything_is_told() {
+    // 3° a frame: at 180° the two walls of the laboratory are behind, and its table is left.
+    let place = TempDir::new().unwrap();
+    let ended = try_simulate(place.path(), "--sequence lab-D --step 1.5 --frames 62 --size 16x12");
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    assert!(
+        ended.stderr.contains("of lab-D: more than a quarter of the image sees no surface"),
+        "{}",
+        ended.stderr
+    );
+    assert_eq!(image::read(&place.path().join("truth/visible/000060.png")).unwrap().at(8, 2), 0.0);
+}
+
+#[test]
 fn what_cannot_be_rendered_is_refused() {
     let place = TempDir::new().unwrap();
     let out = place.path().join("none");
