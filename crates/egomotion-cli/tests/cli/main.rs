@@ -17,4 +17,5 @@ mod process;
 mod recording;
 mod selection;
 mod simulate;
+mod study;
 mod table;

@@ -3,9 +3,8 @@
 mod figures;
 pub mod setting;
 
-use std::convert::Infallible;
-
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 use super::draw::Measuring;
 use super::{Cell, Publication, Study, Table};
@@ -14,7 +13,7 @@ use crate::sim::Sequence;
 use setting::{Score, Setting, merged};
 
 /// Draws that one part of a single setting takes.
-const DRAWS_PER_PART: usize = 20;
+const DRAWS_PER_PART: usize = 10;
 /// Columns of the study's file.
 const COLUMNS: [(&str, &str); 14] = [
     ("sequence", "sequence"),
@@ -32,6 +31,27 @@ const COLUMNS: [(&str, &str); 14] = [
     ("standard_error", "standard error"),
     ("n", "draws"),
 ];
+
+/// Why a setting gives no numbers.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SensitivityError {
+    /// There is no such sequence.
+    #[error("there is no sequence {0}")]
+    Sequence(String),
+    /// The motion is so large that no pixel keeps its surface.
+    #[error("sequence {sequence} at STEP {step}: no pixel sees the same surface before and after")]
+    NothingUsable {
+        /// The sequence.
+        sequence: String,
+        /// STEP.
+        step: f64,
+    },
+}
+
+/// The sequence of a name, as long as one motion takes.
+fn sequence(name: &str) -> Result<Sequence, SensitivityError> {
+    Sequence::named(name, None, Some(2), 1.0).ok_or_else(|| SensitivityError::Sequence(name.to_owned()))
+}
 
 /// The values that all parameters but the swept one have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -202,7 +222,7 @@ fn value_name(value: f64) -> String {
 
 impl Study for Sensitivity {
     type Record = Record;
-    type Error = Infallible;
+    type Error = SensitivityError;
 
     fn name(&self) -> &'static str {
         "sensitivity"
@@ -215,11 +235,11 @@ impl Study for Sensitivity {
         self.settings().into_iter().map(name).collect()
     }
 
-    fn run(&self, part: usize) -> Result<Vec<Record>, Infallible> {
+    fn run(&self, part: usize) -> Result<Vec<Record>, SensitivityError> {
         let Some((name, baseline, sweep, value)) = self.settings().get(part).copied() else {
             return Ok(Vec::new());
         };
-        let Some(sequence) = Sequence::named(name, None, Some(2), 1.0) else { return Ok(Vec::new()) };
+        let sequence = sequence(name)?;
         let (mut step, mut measuring) = (1.0, baseline.measuring());
         sweep.apply(value, &mut step, &mut measuring);
         let setting = Setting { sequence: &sequence, step, measuring, seed: self.seed };
@@ -275,7 +295,7 @@ impl OneSetting {
 
 impl Study for OneSetting {
     type Record = Record;
-    type Error = Infallible;
+    type Error = SensitivityError;
 
     fn name(&self) -> &'static str {
         "table"
@@ -287,10 +307,8 @@ impl Study for OneSetting {
         (0..self.draws).step_by(DRAWS_PER_PART).map(name).collect()
     }
 
-    fn run(&self, part: usize) -> Result<Vec<Record>, Infallible> {
-        let Some(sequence) = Sequence::named(&self.sequence, None, Some(2), 1.0) else {
-            return Ok(Vec::new());
-        };
+    fn run(&self, part: usize) -> Result<Vec<Record>, SensitivityError> {
+        let sequence = sequence(&self.sequence)?;
         let setting =
             Setting { sequence: &sequence, step: self.step, measuring: self.measuring, seed: self.seed };
         let first = part * DRAWS_PER_PART;
@@ -303,7 +321,12 @@ impl Study for OneSetting {
             score,
         };
         let approaches = [Approach::Differential, Approach::Discrete];
-        Ok(setting.scores(range, &approaches).into_iter().map(record).collect())
+        let records: Vec<Record> = setting.scores(range, &approaches).into_iter().map(record).collect();
+        if records.is_empty() {
+            let (sequence, step) = (self.sequence.clone(), self.step);
+            return Err(SensitivityError::NothingUsable { sequence, step });
+        }
+        Ok(records)
     }
 
     fn publish(&self, records: &[Record]) -> Publication {

@@ -125,15 +125,18 @@ impl Floors {
     }
 }
 
+/// φ by a contender whose rows are weighted at a motion.
+type Solve<'a> = Box<dyn Fn(&Contender, &Twist) -> Option<MotionEstimate> + 'a>;
+/// VZ of every measured point through φ, in metres.
+type Through<'a> = Box<dyn Fn(&Twist) -> Vec<f64> + 'a>;
+
 /// What is judged of a draw, the same for both forms.
 struct Trial<'a> {
     approach: Approach,
     /// VZ of every pixel alone, by DCCE and by DV, in metres.
     alone: [(Method, Vec<f64>); 2],
-    /// φ by a contender whose rows are weighted at a motion.
-    solve: Box<dyn Fn(&Contender, &Twist) -> Option<MotionEstimate> + 'a>,
-    /// VZ of every measured point through φ, in metres.
-    through: Box<dyn Fn(&Twist) -> Vec<f64> + 'a>,
+    solve: Solve<'a>,
+    through: Through<'a>,
     /// True VZ of every pixel, in metres, and the least that counts for relative errors.
     truth: Vec<f64>,
     floor_m: f64,
