@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
 
 use crate::study::StudyCommand;
+use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
+
+use crate::simulate::check_size;
 
 /// 3D motion, depth velocity and time to impact from stereo, each with an uncertainty that can be trusted.
 #[derive(Debug, Parser)]
@@ -24,13 +26,22 @@ pub enum Command {
     /// SOURCE is a folder in KITTI odometry layout (image_0, image_1, calib.txt, times.txt) or the
     /// training folder of KITTI 2012 or 2015, whose scenes are run one by one.
     Run(Box<RunArgs>),
-    /// Repeat the experiments of the paper: every figure as SVG, every table as CSV, and one page.
-    #[command(subcommand)]
-    Study(StudyCommand),
+    /// Render a sequence in KITTI layout, with its exact truth beside it.
+    ///
+    /// DIR then holds image_0, image_1, calib.txt, times.txt and poses.txt, which run and info read like a real
+    /// sequence; truth/ with disparity, depth, depth_velocity (PFM) and flow (.flo) on the left camera's pixels,
+    /// visible (PNG: 1 seen by the right camera, 2 by the later left one, 3 both), trajectory_tum.txt and
+    /// motion.toml; and scene.toml.
+    Simulate(SimulateArgs),
     /// Compare a trajectory with the truth, frame to frame and over lengths of path.
     Evaluate(EvaluateArgs),
     /// Say what a source was recognised as: layout, frames, rig, time stamps, truth.
     Info(InfoArgs),
+    /// Repeat the paper's studies: files with every figure, and one page.
+    Study {
+        #[command(subcommand)]
+        command: StudyCommand,
+    },
 }
 
 #[derive(Debug, Args)]
@@ -104,6 +115,56 @@ pub struct RunArgs {
 }
 
 #[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// Name of the motion and its scene: A, B, C, drive, demo … (any other name lists them all).
+    #[arg(long, value_name = "NAME")]
+    pub sequence: String,
+    /// Factor of every motion.
+    #[arg(long, value_name = "S", default_value_t = 1.0, allow_negative_numbers = true, value_parser = step)]
+    pub step: f64,
+    /// Number of frames [default: the sequence's own].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=MAX_FRAMES))]
+    pub frames: Option<u32>,
+    /// Size of the images; the focal length scales with the width [default: the sequence's own].
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(usize, usize)>,
+    /// What the cameras add to the light [default: that of the scene file, or sensor].
+    #[arg(long, value_enum)]
+    pub noise: Option<NoiseArg>,
+    /// Seed of the cameras' noise [default: that of the scene file, or 0].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=MAX_SEED))]
+    pub seed: Option<u64>,
+    /// Seed of the texture on every surface [default: the scene's own].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=MAX_SEED))]
+    pub texture: Option<u64>,
+    /// Scene (and, if it has them, rig and sensor) in place of the sequence's own, as in scene.toml.
+    #[arg(long, value_name = "FILE")]
+    pub scene: Option<PathBuf>,
+    /// Folder for the sequence [default: egomotion-out/NAME].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Worker threads; the results do not depend on their number.
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub threads: Option<usize>,
+    /// Show no progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Files are numbered with six digits.
+const MAX_FRAMES: i64 = 1_000_000;
+/// TOML's integers end here.
+const MAX_SEED: u64 = i64::MAX as u64;
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum NoiseArg {
+    /// Read and shot noise, the right camera with a gain and an offset.
+    Sensor,
+    /// Rounding to 8 bits alone.
+    None,
+}
+
+#[derive(Debug, Args)]
 pub struct EvaluateArgs {
     /// Estimated trajectory, TUM or KITTI rows.
     pub estimate: PathBuf,
@@ -133,6 +194,22 @@ pub fn positive(text: &str) -> Result<usize, String> {
         Ok(n) => Ok(n),
         Err(e) => Err(format!("{e}")),
     }
+}
+
+fn step(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(step) if step.is_finite() && step >= 0.0 => Ok(step),
+        Ok(_) => Err("must be a finite number that is not negative".into()),
+        Err(e) => Err(format!("{e}")),
+    }
+}
+
+/// WxH.
+pub fn size(text: &str) -> Result<(usize, usize), String> {
+    let (width, height) = text.split_once(['x', 'X']).ok_or("give width x height, as 640x480")?;
+    let side = |text: &str| text.parse::<usize>().map_err(|e| format!("{e}"));
+    let size = (side(width)?, side(height)?);
+    check_size(size).map(|()| size)
 }
 
 /// A choice of the library's, as a word of the command line.

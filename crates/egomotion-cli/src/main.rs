@@ -11,9 +11,11 @@ mod report;
 mod results;
 mod run;
 mod session;
+mod simulate;
 mod study;
 mod summary;
 mod terminal;
+mod toml_file;
 
 use std::process::ExitCode;
 
@@ -46,9 +48,10 @@ fn main() -> ExitCode {
     let ending = match &cli.command {
         Command::Demo(args) => demo::demo(args),
         Command::Run(args) => run::run(args),
-        Command::Study(study) => study::study(study),
+        Command::Simulate(args) => simulate::simulate(args),
         Command::Evaluate(args) => evaluate::evaluate(args),
         Command::Info(args) => info::info(args),
+        Command::Study { command } => study::study(command),
     };
     match ending {
         Ok(Ending::Done) => ExitCode::SUCCESS,

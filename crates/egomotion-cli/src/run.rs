@@ -17,7 +17,7 @@ use crate::judge::{self, MapVerdict};
 use crate::results::{About, ResultFolder};
 use crate::session::{Session, progress, stop_signal};
 use crate::summary::{Index, SceneEntry, Summary};
-use crate::{Ending, Usage, terminal};
+use crate::{Ending, Usage, terminal, toml_file};
 
 /// Run a source, be it one sequence or a set of scenes.
 pub fn run(args: &RunArgs) -> Result<Ending> {
@@ -81,15 +81,7 @@ fn ending(complete: bool) -> Ending {
 fn resolve_config(args: &RunArgs) -> Result<Config> {
     let mut config = match &args.config {
         None => Config::default(),
-        Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .with_context(|| format!("{}: cannot be read", path.display()))?;
-            toml::from_str(&text).map_err(|e| {
-                let breaks = |end: usize| text.bytes().take(end).filter(|&b| b == b'\n').count();
-                let line = e.span().map_or(String::new(), |s| format!(":{}", breaks(s.start) + 1));
-                anyhow!("{}{line}: {}", path.display(), e.message().replace('\n', " "))
-            })?
-        }
+        Some(path) => toml_file::read(path)?,
     };
     if let Some(method) = args.method {
         config.method = method.into();

@@ -8,7 +8,21 @@ use std::path::{Path, PathBuf};
 use egomotion::geometry::StereoRig;
 use nalgebra::Vector3;
 
-use crate::{IoError, read};
+use crate::{IoError, read, write};
+
+/// Write the grey pair of a rig as P0 and P1, such that [`Calibration::rig`] gives the rig back.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(path: &Path, rig: &StereoRig) -> Result<(), IoError> {
+    let row = |cx: f64, last: f64| {
+        let (fx, fy, cy) = (rig.focal_px, rig.focal_y_px, rig.cy_px);
+        // Written so that the numbers read back the same.
+        format!("{fx:e} 0 {cx:e} {last:e} 0 {fy:e} {cy:e} 0 0 0 1 0")
+    };
+    let (left, right) = (row(rig.cx_px, 0.0), row(rig.cx_px + rig.doffs_px, -rig.depth_disparity_product()));
+    write::bytes(path, format!("P0: {left}\nP1: {right}\n").as_bytes())
+}
 
 /// Which of KITTI's two pairs of cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,6 +191,29 @@ mod tests {
         let rig = rig(&format!("P0: {LEFT}\nP1: {RIGHT}\n")).unwrap();
         assert_eq!((rig.focal_px, rig.focal_y_px, rig.cx_px, rig.cy_px), (700.0, 700.0, 600.0, 180.0));
         assert_eq!((rig.baseline_m, rig.doffs_px, rig.width_px, rig.height_px), (0.5, 3.0, 1242, 375));
+    }
+
+    #[test]
+    fn a_written_rig_comes_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("calib.txt");
+        let given = StereoRig {
+            focal_px: 5.0 / 0.012,
+            focal_y_px: 400.0 / 3.0,
+            cx_px: 159.5 + 1.0 / 7.0,
+            cy_px: 119.5,
+            doffs_px: 0.1 + 0.2,
+            baseline_m: 0.13,
+            width_px: 320,
+            height_px: 240,
+        };
+        write(&path, &given).unwrap();
+        let back = Calibration::read(&path).unwrap().rig(CameraPair::Grey, (320, 240)).unwrap();
+        let numbers = |r: &StereoRig| [r.focal_px, r.focal_y_px, r.cx_px, r.cy_px, r.doffs_px, r.baseline_m];
+        for (a, b) in numbers(&given).into_iter().zip(numbers(&back)) {
+            assert!((a - b).abs() <= 1e-12, "{given:?} {back:?}");
+        }
+        assert!(write(&folder.path().join("none").join("calib.txt"), &given).is_err());
     }
 
     #[test]

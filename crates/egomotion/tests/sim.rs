@@ -165,3 +165,111 @@ fn every_patch_has_texture_to_match() {
         assert!(weakest > 2.0 && percent > 4.0, "{name} {frame}: {weakest} {percent}");
     }
 }
+
+#[test]
+fn structure_is_exact_at_any_pose() {
+    // Each surface of the room by its own closed form, in the world, from poses turned about two axes.
+    let sequence = Sequence::named("C", None, Some(4), 8.0).unwrap();
+    let centre = Vector3::new(-0.35, 0.30, 2.1);
+    let mut seen = [0; 6];
+    for (k, (u, v)) in (0..4).flat_map(|k| pixels().map(move |pixel| (k, pixel))) {
+        let world_from_left = sequence.world_from_left(k).unwrap();
+        let point = sequence.view(k).unwrap().truth_at(u, v).unwrap();
+        let p = world_from_left.apply(&point.point);
+        let part = usize::from(point.surface / 6);
+        seen[part] += 1;
+        let off = match part {
+            0 => p.y - 0.9,
+            1 => p.z - 6.0,
+            2 => p.x + 1.7,
+            3 => p.x - 1.7,
+            4 => (p - centre).norm() - 0.4,
+            _ => sequence.scene.parts()[5].shape.clearance_m(&p),
+        };
+        assert!(off.abs() < 1e-12, "{k} {u} {v} part {part}: {off}");
+        let (x, y) = sequence.rig.image_from_pixel(u, v);
+        assert!((point.point.x / point.depth_m() - x / sequence.rig.focal_px).abs() < 1e-14);
+        assert!((point.point.y / point.depth_m() - y / sequence.rig.focal_px).abs() < 1e-14);
+    }
+    assert!(seen.iter().all(|&n| n > 3), "{seen:?}");
+}
+
+#[test]
+fn right_visibility_is_a_cast_from_the_right_camera() {
+    // The right camera is the left one of the same rig moved by its baseline.
+    let sequence = Sequence::named("drive", None, Some(4), 2.0).unwrap();
+    let (view, rig) = (sequence.view(3).unwrap(), &sequence.rig);
+    let mut right = view;
+    right.world_from_cyclopean.translation +=
+        view.world_from_cyclopean.rotation * Vector3::new(rig.baseline_m, 0.0, 0.0);
+    let (truth, mut seen, mut hidden) = (view.truth(), 0, 0);
+    for v in 0..rig.height_px {
+        for u in 0..rig.width_px {
+            let point = truth.at(u, v).unwrap();
+            let u_right = u as f64 - point.disparity_px();
+            if u_right < 0.0 {
+                assert!(!point.in_right);
+                continue;
+            }
+            // What the right camera sees there is the point, or something nearer.
+            let nearer = point.depth_m() - right.truth_at(u_right, v as f64).unwrap().depth_m();
+            assert!(nearer > -1e-5 * point.depth_m(), "{u} {v} {nearer}");
+            assert_eq!(point.in_right, nearer < 1e-5 * point.depth_m(), "{u} {v} {nearer}");
+            seen += usize::from(point.in_right);
+            hidden += usize::from(!point.in_right);
+        }
+    }
+    assert!(hidden > 500 && seen > 50_000, "{hidden} {seen}");
+}
+
+#[test]
+fn truth_maps_are_the_truth_of_every_pixel() {
+    // Other principal points and pixels that are not square.
+    let mut sequence = Sequence::named("drive", Some((160, 120)), Some(2), 4.0).unwrap();
+    (sequence.rig.doffs_px, sequence.rig.focal_y_px) = (3.5, 190.0);
+    let (view, next) = (sequence.view(0).unwrap(), sequence.view(1).unwrap());
+    let phi = sequence.phi(0).unwrap();
+    let (maps, truth) = (view.truth_maps(Some(&phi)), view.truth());
+    let mut followed = 0;
+    for v in 0..120 {
+        for u in 0..160 {
+            let point = truth.at(u, v).unwrap();
+            let motion = view.motion_at(&point, &phi);
+            let get = |field: &egomotion::geometry::Field| f64::from(field.get(u, v).unwrap());
+            assert!((get(&maps.depth) - point.depth_m()).abs() < 1e-6 * point.depth_m());
+            assert!((get(&maps.shift) + 3.5 - point.disparity_px()).abs() < 1e-5);
+            assert!((get(&maps.depth_velocity) - motion.depth_change_m(&point)).abs() < 1e-6);
+            assert_eq!(maps.visible.at(u, v), u8::from(point.in_right) + 2 * u8::from(motion.in_later));
+            if motion.in_later {
+                // The later frame sees the same depth there; f32 holds the place to 1e-5 px.
+                let (u, v) = (u as f64 + get(&maps.flow[0]), v as f64 + get(&maps.flow[1]));
+                let there = next.truth_at(u, v).unwrap();
+                followed += usize::from((there.depth_m() - motion.later.z).abs() < 1e-4);
+            }
+        }
+    }
+    let later = maps.visible.values().iter().filter(|&&bits| bits & 2 != 0).count();
+    assert!(followed > later - 20 && later > 15_000, "{followed} of {later}");
+    let last = view.truth_maps(None);
+    assert_eq!((last.depth, last.shift), (maps.depth, maps.shift));
+    assert_eq!(last.depth_velocity.count() + last.flow[0].count() + last.flow[1].count(), 0);
+    assert!(last.visible.values().iter().all(|&bits| bits < 2));
+}
+
+#[test]
+fn another_texture_is_another_picture_of_the_same_room() {
+    let plain = Sequence::named("C", Some((80, 60)), None, 1.0).unwrap();
+    let other = plain.clone().with_texture(7);
+    let [a, b] = [&plain, &other].map(|s| s.view(0).unwrap().render(1).left);
+    let differ = a.values().iter().zip(b.values()).filter(|(a, b)| (*a - *b).abs() > 3.0).count();
+    assert!(differ > 80 * 60 / 2, "{differ}");
+    assert_eq!(plain.view(0).unwrap().truth(), other.view(0).unwrap().truth());
+    assert_eq!(plain.clone().with_texture(plain.scene.texture().seed()), plain);
+}
+
+#[test]
+fn a_pose_that_is_no_number_is_not_clear_of_anything() {
+    let far = Sequence::named("C", None, Some(3), 1e308).unwrap();
+    assert!(far.clearance_m(0).unwrap() > 0.0);
+    assert!((1..3).all(|k| far.clearance_m(k).is_some_and(|c| c.is_nan() || c < 0.0)));
+}

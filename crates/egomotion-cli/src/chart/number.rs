@@ -35,9 +35,11 @@ pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return "–".into();
     }
-    let magnitude = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
+    // Of the rounded value: 99.97 is 100, not 100.0.
+    let rounded = format!("{value:.*e}", (digits - 1).max(0) as usize);
+    let magnitude = rounded.split_once('e').and_then(|(_, exponent)| exponent.parse().ok()).unwrap_or(0);
     if !(-5..9).contains(&magnitude) {
-        return format!("{value:.*e}", (digits - 1).max(0) as usize).replace('-', "−");
+        return rounded.replace('-', "−");
     }
     fixed(value, (digits - 1 - magnitude).max(0) as usize)
 }
@@ -107,6 +109,7 @@ mod tests {
     fn numbers_read_well() {
         assert_eq!(significant(0.012345, 2), "0.012");
         assert_eq!(significant(-1234.5, 3), "−1234");
+        assert_eq!([significant(99.97, 3), significant(0.0, 3)], ["100", "0.00"]);
         assert_eq!(significant(f64::NAN, 3), "–");
         assert_eq!(significant(3.2e-9, 2), "3.2e−9");
         assert_eq!(fixed(-0.0004, 2), "0.00");

@@ -6,16 +6,24 @@ use clap::{Args, Subcommand};
 
 use egomotion::sim::Sequence;
 
-use crate::args::positive;
+use crate::args::{positive, size};
 
-/// Which experiment.
+/// The studies.
 #[derive(Debug, Subcommand)]
 pub enum StudyCommand {
+    /// One setting of the synthetic study alone: every method, approach and estimator.
+    Table(TableArgs),
+    /// The six sweeps of section 7.1, at both baselines: Figures 7, 8 and 9.
+    Sensitivity(SensitivityArgs),
+    /// Section 5: the table under (51), Figures 3 to 6, and every variance formula against draws.
+    Uncertainty(LaboratoryArgs),
     /// Section 7.2: Tables 3 to 7 and Figures 11 to 14, on the manipulator's sequences or on a recording.
     ///
     /// Without SOURCE the sequences lab-A … lab-M are rendered and go through the whole image pipeline. SOURCE is a
     /// folder in KITTI odometry layout with true poses (poses.txt, or ../../poses/NAME.txt).
     Real(RealArgs),
+    /// Every study, with one page that links them.
+    All(LaboratoryArgs),
 }
 
 /// What all studies take.
@@ -54,7 +62,7 @@ impl LaboratoryArgs {
 #[derive(Debug, Clone, Args)]
 pub struct TableArgs {
     /// The sequence: A moves ahead, B turns, C does both.
-    #[arg(long, value_name = "NAME", ignore_case = true, value_parser = ["A", "B", "C"])]
+    #[arg(long, value_name = "NAME", value_parser = sequence)]
     pub sequence: String,
     /// STEP: the motion is so many times that of the sequence.
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = above_zero, allow_negative_numbers = true)]
@@ -71,6 +79,33 @@ pub struct TableArgs {
     #[command(flatten)]
     pub laboratory: LaboratoryArgs,
 }
+
+/// The six sweeps.
+#[derive(Debug, Clone, Args)]
+pub struct SensitivityArgs {
+    /// The sequences; each is run once.
+    #[arg(
+        long = "sequence",
+        value_name = "NAME,…",
+        value_delimiter = ',',
+        default_values = SEQUENCES,
+        value_parser = sequence
+    )]
+    sequences: Vec<String>,
+    #[command(flatten)]
+    pub laboratory: LaboratoryArgs,
+}
+
+impl SensitivityArgs {
+    /// The sequences in their order, each once.
+    pub fn sequences(&self) -> Vec<String> {
+        let asked = |name: &&str| self.sequences.iter().any(|typed| typed == name);
+        SEQUENCES.into_iter().filter(asked).map(str::to_owned).collect()
+    }
+}
+
+/// The paper's sequences.
+const SEQUENCES: [&str; 3] = ["A", "B", "C"];
 
 /// Section 7.2 on images.
 #[derive(Debug, Clone, Args)]
@@ -115,6 +150,11 @@ pub struct Levels(pub Option<u32>);
 /// Fewer points do not determine any motion that a noise of one eighth of a pixel leaves standing.
 const LEAST_FEATURES: usize = 8;
 
+fn sequence(text: &str) -> Result<String, String> {
+    let known = SEQUENCES.into_iter().find(|name| name.eq_ignore_ascii_case(text));
+    known.map(str::to_owned).ok_or_else(|| "there are the sequences A, B and C".into())
+}
+
 fn number(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
@@ -126,15 +166,6 @@ fn lab_name(text: &str) -> Result<String, String> {
     let known = Sequence::lab_names().find(|name| name.eq_ignore_ascii_case(text));
     let all = || Sequence::lab_names().collect::<Vec<_>>().join(", ");
     known.map(str::to_owned).ok_or_else(|| format!("must be of {}", all()))
-}
-
-/// Smaller images hold no patch that could be matched, larger ones no memory.
-const SIDES: std::ops::RangeInclusive<usize> = 64..=4096;
-
-fn size(text: &str) -> Result<(usize, usize), String> {
-    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    let fits = |(w, h): &(usize, usize)| SIDES.contains(w) && SIDES.contains(h);
-    sides.filter(fits).ok_or_else(|| "must be WIDTHxHEIGHT, each 64 to 4096 pixels".into())
 }
 
 fn above_zero(text: &str) -> Result<f64, String> {
@@ -174,6 +205,12 @@ mod tests {
         table: TableArgs,
     }
 
+    #[derive(Debug, Parser)]
+    struct TypedSweeps {
+        #[command(flatten)]
+        sweeps: SensitivityArgs,
+    }
+
     fn typed(options: &str) -> Result<TableArgs, String> {
         let words = std::iter::once("table").chain(options.split_whitespace());
         Typed::try_parse_from(words).map(|t| t.table).map_err(|e| {
@@ -195,6 +232,16 @@ mod tests {
         assert_eq!(args.laboratory.folder(None), Path::new("egomotion-out/study"));
     }
 
+    #[test]
+    fn sequences_are_swept_once_each() {
+        let sequences = |words: &[&str]| {
+            TypedSweeps::try_parse_from([&["sensitivity"], words].concat()).map(|t| t.sweeps.sequences())
+        };
+        assert_eq!(sequences(&[]).unwrap(), ["A", "B", "C"]);
+        assert_eq!(sequences(&["--sequence", "c,A,C"]).unwrap(), ["A", "C"]);
+        assert_eq!(sequences(&["--sequence", "A,D"]).unwrap_err().exit_code(), 2);
+    }
+
     #[derive(Debug, Parser)]
     struct TypedReal {
         #[command(flatten)]
@@ -214,8 +261,8 @@ mod tests {
         assert_eq!((args.source.unwrap().to_str(), args.frames, args.stride), (Some("drive/06"), 20, 2));
         for (options, words) in [
             ("--sequences lab-K", "must be of lab-A, lab-B"),
-            ("--size 320", "must be WIDTHxHEIGHT"),
-            ("--size 0x0", "must be WIDTHxHEIGHT"),
+            ("--size 320", "give width x height"),
+            ("--size 0x0", "'0x0' for '--size <WxH>'"),
             ("--step 0", "--step <N>"),
             ("--step -1", "--step"),
             ("--frames 5", "<SOURCE>"),
@@ -230,7 +277,7 @@ mod tests {
     fn what_has_no_meaning_is_refused_in_words() {
         for (options, words) in [
             ("", "--sequence <NAME>"),
-            ("--sequence Q", "'Q' for '--sequence <NAME>'\n  [possible values: A, B, C]"),
+            ("--sequence Q", "'Q' for '--sequence <NAME>': there are the sequences A, B and C"),
             ("--sequence A --step -1", "'-1' for '--step <S>': must be above 0"),
             ("--sequence A --step 0", "must be above 0"),
             ("--sequence A --step nan", "must be a number"),

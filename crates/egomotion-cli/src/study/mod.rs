@@ -14,21 +14,67 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Result;
+use egomotion::study::draw::Measuring;
+use egomotion::study::real::LabStudy;
+use egomotion::study::sensitivity::{OneSetting, Sensitivity};
+use egomotion::study::uncertainty::Uncertainty;
 
 use crate::run::set_threads;
 use crate::{Ending, terminal};
 
 pub use args::StudyCommand;
-
-use args::LaboratoryArgs;
+use args::{LaboratoryArgs, TableArgs};
 use laboratory::{Laboratory, Options};
 
-/// Run what was typed.
+/// Run what was asked for.
 pub fn study(command: &StudyCommand) -> Result<Ending> {
     match command {
+        StudyCommand::Table(args) => alone(&args.laboratory, &one_setting(args)),
+        StudyCommand::Sensitivity(args) => {
+            alone(&args.laboratory, &sensitivity(&args.laboratory, args.sequences()))
+        }
         StudyCommand::Real(args) => real::run(args),
+        StudyCommand::Uncertainty(args) => alone(args, &uncertainty(args)),
+        StudyCommand::All(args) => {
+            let mut laboratory = open(args, None, Some("The paper's studies, repeated"))?;
+            // Its draws are of another kind and number.
+            laboratory.run(&uncertainty(&LaboratoryArgs { draws: None, ..args.clone() }))?;
+            laboratory.run(&sensitivity(args, Sensitivity::default().sequences))?;
+            // As many textures as it has by itself.
+            laboratory.run(&LabStudy { first_seed: args.seed, ..LabStudy::default() })?;
+            laboratory.close()
+        }
     }
 }
+
+fn one_setting(args: &TableArgs) -> OneSetting {
+    OneSetting {
+        sequence: args.sequence.clone(),
+        step: args.step,
+        measuring: Measuring {
+            round: args.round.0,
+            std_disp_px: args.std,
+            std_vel_px: args.std,
+            std_track_px: args.std,
+            features: args.features,
+        },
+        draws: args.laboratory.draws.unwrap_or(DRAWS),
+        seed: args.laboratory.seed,
+    }
+}
+
+fn sensitivity(args: &LaboratoryArgs, sequences: Vec<String>) -> Sensitivity {
+    let own = Sensitivity::default();
+    Sensitivity { sequences, draws: args.draws.unwrap_or(own.draws), seed: args.seed }
+}
+
+fn uncertainty(args: &LaboratoryArgs) -> Uncertainty {
+    let own = Uncertainty::default();
+    Uncertainty { draws: args.draws.unwrap_or(own.draws), seed: args.seed, ..own }
+}
+
+/// Draws of a single setting where none are asked for.
+const DRAWS: usize = 40;
 
 /// Run one study into its folder.
 fn alone<S: egomotion::study::Study>(args: &LaboratoryArgs, study: &S) -> Result<Ending> {

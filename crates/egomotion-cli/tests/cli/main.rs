@@ -16,4 +16,5 @@ mod outputs;
 mod process;
 mod recording;
 mod selection;
+mod simulate;
 mod table;

@@ -1,10 +1,14 @@
 //! A scene of plain parts: what a ray sees, and how bright it looks.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
+use super::scene_file::SceneFile;
 use super::shape::Shape;
 use super::texture::Texture;
 
+/// The most parts of a scene: a surface id has 16 bits.
+pub const MAX_PARTS: usize = 10_000;
 /// Number of surface ids that a part takes: a box has six faces.
 const FACES: u16 = 6;
 /// Where the texture saturates, in its standard deviations: keeps every grey level above zero.
@@ -17,14 +21,16 @@ const TILE_CONTRAST: f64 = 0.3;
 const SHADE_REACH: f64 = 5.0;
 
 /// One part of a scene.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Part {
-    /// Its shape, in the world's frame.
-    pub shape: Shape,
     /// Mean grey level in full light; up to 150 keeps nearly every spot within 8 bits.
     pub grey: f64,
     /// Side of the dark and bright tiles laid in it along the world's axes, in metres; 0 for none.
+    #[serde(default)]
     pub tile_m: f64,
+    /// Its shape, in the world's frame.
+    pub shape: Shape,
 }
 
 /// A ball around a part, or one that shades like it.
@@ -50,7 +56,11 @@ pub struct Hit {
 
 /// Textured parts under one lamp. Everything that decides a point's brightness is fixed to the world,
 /// so that brightness is constant between cameras and between frames.
-#[derive(Debug, Clone, PartialEq)]
+///
+/// Written and read by serde as its parts; what is read is checked ([`super::SceneError`]) and equals what was
+/// written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "SceneFile", into = "SceneFile")]
 pub struct Scene {
     parts: Vec<Part>,
     texture: Texture,
@@ -65,7 +75,7 @@ impl Scene {
     /// Every surface carries the texture of `seed`; `contrast` is the standard deviation of its grey level
     /// as a share of the mean, below 0.4 so that it never reaches black.
     pub fn new(mut parts: Vec<Part>, lamp_m: Vector3<f64>, contrast: f64, seed: u64) -> Self {
-        parts.truncate(10_000);
+        parts.truncate(MAX_PARTS);
         let shade = |(part, id): (&Part, u16)| {
             part.shape.shade_ball().map(|(centre, radius_m)| Ball { part: id, centre, radius_m })
         };
@@ -156,10 +166,25 @@ impl Scene {
         )
     }
 
-    /// The same parts with another texture.
+    /// The same parts under the texture of another seed.
     #[must_use]
     pub fn with_texture(self, seed: u64) -> Self {
         Self { texture: Texture::new(seed), ..self }
+    }
+
+    /// What every surface carries.
+    pub fn texture(&self) -> &Texture {
+        &self.texture
+    }
+
+    /// Standard deviation of the texture, as a share of the mean grey level.
+    pub fn contrast(&self) -> f64 {
+        self.contrast
+    }
+
+    /// Where the lamp hangs, in metres, world frame.
+    pub fn lamp_m(&self) -> Vector3<f64> {
+        self.lamp_m
     }
 
     /// The parts, in the order of their surface ids.
@@ -192,9 +217,10 @@ impl Scene {
         !self.parts.iter().any(blocks)
     }
 
-    /// Distance from a point to the nearest surface, in metres; negative inside a solid or behind a wall.
+    /// Distance from a point to the nearest surface, in metres; negative inside a solid or behind a wall, NaN
+    /// where the point is.
     pub fn clearance_m(&self, p: &Vector3<f64>) -> f64 {
-        self.parts.iter().map(|part| part.shape.clearance_m(p)).fold(f64::INFINITY, f64::min)
+        self.parts.iter().map(|part| part.shape.clearance_m(p)).fold(f64::INFINITY, least)
     }
 
     /// Grey level, 0 … 255, of a hit seen by a pixel whose steps move the point by `du`, `dv` (metres).
@@ -229,6 +255,11 @@ impl Scene {
         };
         (AMBIENT + lamp) * self.shades.iter().map(open).product::<f64>()
     }
+}
+
+/// The lesser of two numbers; NaN if either is, which [`f64::min`] hides.
+pub(super) fn least(a: f64, b: f64) -> f64 {
+    if a < b || a.is_nan() { a } else { b }
 }
 
 /// Brightness of a solid chequer at a hit, in ±½ [`TILE_CONTRAST`], averaged over the pixel's extent along
@@ -307,6 +338,26 @@ mod tests {
         assert!(!scene.sees(&Vector3::zeros(), &behind));
         assert!(scene.sees(&Vector3::new(-1.5, 0.0, 0.0), &behind));
         assert!((scene.clearance_m(&Vector3::zeros()) - 0.9).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_texture_has_no_seam_at_the_edges_of_a_box() {
+        let scene = Scene::paper_room();
+        let texture_at = |x: f64, y: f64| {
+            let hit = scene.cast(&Vector3::zeros(), &Vector3::new(x, y, 1.0)).unwrap();
+            let full = scene.parts[5].grey * scene.light(5, &hit);
+            (hit.surface, scene.grey(&hit, &Vector3::zeros(), &Vector3::zeros()) / full - 1.0)
+        };
+        // Along a row across the box: where the face changes the texture goes on, within what 1/40 mm changes.
+        let mut changes = 0;
+        for i in 0..60_000 {
+            let [(face, a), (next, b)] = [i, i + 1].map(|i| texture_at(1e-5 * f64::from(i), 0.17));
+            if face != next && face / FACES == 5 && next / FACES == 5 {
+                assert!((a - b).abs() < 0.01, "{a} {b}");
+                changes += 1;
+            }
+        }
+        assert_eq!(changes, 1);
     }
 
     #[test]

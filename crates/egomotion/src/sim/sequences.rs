@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::render::View;
-use super::scene::Scene;
+use super::scene::{Scene, least};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 
 /// Constant motions of section 7.1 and ours: name, then (tX, tY, tZ) in mm and Ω in degrees per frame,
@@ -133,10 +133,15 @@ impl Sequence {
     }
 
     /// Distance from the nearer camera to the nearest surface at frame `k`, in metres; negative where a
-    /// camera has left the room or entered a part; `None` past the end.
+    /// camera has left the room or entered a part, NaN where its pose is; `None` past the end.
     pub fn clearance_m(&self, k: usize) -> Option<f64> {
         let (left, right) = self.view(k)?.eyes();
-        Some(self.scene.clearance_m(&left.origin).min(self.scene.clearance_m(&right.origin)))
+        Some(least(self.scene.clearance_m(&left.origin), self.scene.clearance_m(&right.origin)))
+    }
+
+    /// The same sequence, its surfaces under the texture of another seed.
+    pub fn with_texture(self, seed: u64) -> Self {
+        Self { scene: self.scene.with_texture(seed), ..self }
     }
 }
 

@@ -1,9 +1,11 @@
 //! The plain shapes a scene is made of, and where a ray meets them.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// One shape; lengths in metres, world frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
     /// The infinite plane n · P = `offset_m`; the unit normal points into the room.
     Plane {
@@ -32,9 +34,37 @@ pub enum Shape {
         centre: Vector3<f64>,
         /// Half sizes along the box's own axes.
         half_m: Vector3<f64>,
-        /// Rotation from the box's axes to the world's.
-        world_from_box: Matrix3<f64>,
+        /// Its turn, from the box's axes to the world's.
+        #[serde(rename = "turn_deg", default)]
+        turn: Turn,
     },
+}
+
+/// A turn about the vertical axis Y (right-handed); in a file its angle in degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "f64", into = "f64")]
+pub struct Turn {
+    deg: f64,
+    world_from_turned: Matrix3<f64>,
+}
+
+impl From<f64> for Turn {
+    fn from(deg: f64) -> Self {
+        let rotation = Rotation3::from_axis_angle(&Vector3::y_axis(), deg.to_radians());
+        Self { deg, world_from_turned: rotation.into_inner() }
+    }
+}
+
+impl From<Turn> for f64 {
+    fn from(turn: Turn) -> Self {
+        turn.deg
+    }
+}
+
+impl Default for Turn {
+    fn default() -> Self {
+        Self::from(0.0)
+    }
 }
 
 /// Where a ray meets a shape first.
@@ -51,9 +81,7 @@ pub struct Meeting {
 impl Shape {
     /// A box turned by `turn_deg` about the Y axis (right-handed).
     pub fn turned_box(centre: [f64; 3], half_m: [f64; 3], turn_deg: f64) -> Self {
-        let world_from_box =
-            Rotation3::from_axis_angle(&Vector3::y_axis(), turn_deg.to_radians()).into_inner();
-        Self::Box { centre: centre.into(), half_m: half_m.into(), world_from_box }
+        Self::Box { centre: centre.into(), half_m: half_m.into(), turn: turn_deg.into() }
     }
 
     /// A ball.
@@ -71,6 +99,40 @@ impl Shape {
         Self::Quad { centre: centre.into(), half_m: [half_u.into(), half_v.into()] }
     }
 
+    /// Whether it is a shape that rays can meet; else what is wrong with it.
+    ///
+    /// # Errors
+    /// A number that is not finite, a size that is not positive, a normal or edges that are not what they must be.
+    pub fn check(&self) -> Result<(), &'static str> {
+        let all = |vectors: &[&Vector3<f64>], scalars: &[f64]| {
+            vectors.iter().flat_map(|v| v.iter()).chain(scalars).all(|c| c.is_finite())
+        };
+        let (finite, sound, reason) = match self {
+            Self::Plane { normal, offset_m } => {
+                let unit = (normal.norm() - 1.0).abs() < 1e-6;
+                (all(&[normal], &[*offset_m]), unit, "the plane's normal is not of length 1")
+            }
+            Self::Quad { centre, half_m: [a, b] } => {
+                let area = a.norm() * b.norm();
+                let square = area > 0.0 && a.dot(b).abs() <= 1e-6 * area;
+                (all(&[centre, a, b], &[]), square, "the quad's half edges are not perpendicular, or zero")
+            }
+            Self::Sphere { centre, radius_m } => {
+                (all(&[centre], &[*radius_m]), *radius_m > 0.0, "the sphere's radius is not positive")
+            }
+            Self::Box { centre, half_m, turn } => (
+                all(&[centre, half_m], &[turn.deg]),
+                half_m.min() > 0.0,
+                "a half size of the box is not positive",
+            ),
+        };
+        match (finite, sound) {
+            (false, _) => Err("a number of the shape is not finite"),
+            (_, false) => Err(reason),
+            _ => Ok(()),
+        }
+    }
+
     /// First meeting of the ray origin + s · direction, s > 0, with the surface; `None` if it misses.
     pub fn meet(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Meeting> {
         match self {
@@ -83,7 +145,7 @@ impl Shape {
                 (inside(a) && inside(b)).then(|| Meeting { normal: m.normal.normalize(), ..m })
             }
             Self::Sphere { centre, radius_m } => meet_sphere(centre, *radius_m, origin, direction),
-            Self::Box { centre, half_m, world_from_box } => {
+            Self::Box { centre, half_m, turn: Turn { world_from_turned: world_from_box, .. } } => {
                 // Most rays miss the ball around the box, which is quickly seen.
                 let from = origin - centre;
                 let (outside, along) = (from.norm_squared() - half_m.norm_squared(), from.dot(direction));
@@ -108,8 +170,8 @@ impl Shape {
                 away.norm()
             }
             Self::Sphere { centre, radius_m } => (p - centre).norm() - radius_m,
-            Self::Box { centre, half_m, world_from_box } => {
-                let out = world_from_box.tr_mul(&(p - centre)).abs() - half_m;
+            Self::Box { centre, half_m, turn } => {
+                let out = turn.world_from_turned.tr_mul(&(p - centre)).abs() - half_m;
                 out.sup(&Vector3::zeros()).norm() + out.max().min(0.0)
             }
         }

@@ -36,6 +36,7 @@ struct Waves {
 /// exact mean over its (skewed, stretched) footprint on the surface, and images do not alias.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
+    seed: u64,
     waves: Vec<Waves>,
 }
 
@@ -64,7 +65,12 @@ impl Texture {
         }
         let unit = (1.0 / variance.sqrt()) as f32;
         waves.iter_mut().flat_map(|block| &mut block.amplitude).for_each(|a| *a *= unit);
-        Self { waves }
+        Self { seed, waves }
+    }
+
+    /// The seed it was made from.
+    pub fn seed(&self) -> u64 {
+        self.seed
     }
 
     /// Value at point `p` (metres) seen by a pixel whose steps right and down move the point by `du`, `dv`.

@@ -104,7 +104,7 @@ impl Contender {
             }
             Method::Dv => solver.binocular(&draw.motions),
             Method::Joint => solver.joint(&draw.motions),
-            _ => solver.likelihood(&draw.motions),
+            _ => solver.likelihood(&draw.complete),
         }
     }
 
@@ -132,7 +132,7 @@ impl Contender {
             Method::Joint => solver.joint(&flows()),
             Method::Rigid => solver.alignment(&draw.motions, Form::Rigid),
             Method::Linear22 => solver.alignment(&draw.motions, Form::Affine),
-            Method::Ml => solver.likelihood(&draw.motions),
+            Method::Ml => solver.likelihood(&draw.complete),
         }
     }
 }

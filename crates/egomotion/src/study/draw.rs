@@ -77,6 +77,14 @@ pub struct Draw<'a, Change, Motion> {
     pub changes: Vec<Change>,
     /// What binocular flow takes.
     pub motions: Vec<Motion>,
+    /// All that was measured, which is what maximum likelihood takes.
+    pub complete: Vec<Motion>,
+}
+
+impl<'a, Change, Motion> Draw<'a, Change, Motion> {
+    fn of(pixels: Vec<&'a UsablePixel>) -> Self {
+        Self { pixels, changes: Vec::new(), motions: Vec::new(), complete: Vec::new() }
+    }
 }
 
 /// Every usable pixel with its velocities.
@@ -98,19 +106,21 @@ fn gradient(disparity: &[f64], index: usize, width: usize) -> [f64; 2] {
 /// Dense measurements of the differential form, with the noise of `seed`.
 ///
 /// Each pixel of the three disparity maps has noise of its own; d_t is half the difference of t + 1 and t − 1.
-/// The right camera's flow is that of the same point.
+/// The right camera's flow is that of the same point; its v_y, which is the left one's, is a second measurement
+/// that the paper's methods do not use.
 pub fn differential<'a>(world: &'a World, measuring: &Measuring, seed: u64) -> Differential<'a> {
     let mut noise = Noise(Pcg64Mcg::seed_from_u64(seed));
     let maps = [When::Before, When::Now, When::After]
         .map(|when| measuring.disparities(world.disparity(when), &mut noise));
     let (var_d, var_v) = (held(measuring.disparity_variance()), held(measuring.std_vel_px.powi(2)));
     let pixels: Vec<&UsablePixel> = world.pixels().iter().filter(|p| p.differential).collect();
-    let mut draw = Draw { pixels, changes: Vec::new(), motions: Vec::new() };
+    let mut draw = Draw::of(pixels);
     for p in &draw.pixels {
         let [dx, dy] = gradient(&maps[1], p.index, world.rig.width_px);
         let (d, dt) = (maps[1][p.index], 0.5 * (maps[2][p.index] - maps[0][p.index]));
         let mut velocity = |exact: f64| exact + measuring.std_vel_px * noise.next();
-        let [vx, vy, right] = [p.flow_left.x, p.flow_left.y, p.flow_right_x].map(&mut velocity);
+        let [vx, vy, right_x] = [p.flow_left.x, p.flow_left.y, p.flow_right_x].map(&mut velocity);
+        let right_y = velocity(p.flow_left.y);
         let (x_px, y_px) = (p.xyd.x, p.xyd.y);
         let half = 0.5 * var_d;
         draw.changes.push(DepthFlow {
@@ -119,11 +129,13 @@ pub fn differential<'a>(world: &'a World, measuring: &Measuring, seed: u64) -> D
             disparity: Gaussian::independent([d, dx, dy, dt], [var_d, half, half, half]),
             flow: Gaussian::independent([vx, vy], [var_v; 2]),
         });
-        draw.motions.push(StereoFlow {
+        let flow = |vy: f64, var_vy: f64| StereoFlow {
             x_px,
             y_px,
-            measured: Gaussian::independent([d, vx, vy, right], [var_d, var_v, var_v, var_v]),
-        });
+            measured: Gaussian::independent([d, vx, vy, right_x], [var_d, var_v, var_vy, var_v]),
+        };
+        draw.motions.push(flow(vy, var_v));
+        draw.complete.push(flow(0.5 * (vy + right_y), 0.5 * var_v));
     }
     draw
 }
@@ -139,7 +151,7 @@ pub fn discrete<'a>(world: &'a World, measuring: &Measuring, seed: u64) -> Discr
     let pixels: Vec<&UsablePixel> = chosen.iter().map(|i| all[i]).collect();
     let mut noise = Noise(rng);
     let maps = [When::Now, When::After].map(|when| measuring.disparities(world.disparity(when), &mut noise));
-    let mut draw = Draw { pixels, changes: Vec::new(), motions: Vec::new() };
+    let mut draw = Draw::of(pixels);
     for p in &draw.pixels {
         let later = [
             p.later_xyd.x + measuring.std_track_px * noise.next(),
@@ -161,6 +173,7 @@ pub fn discrete<'a>(world: &'a World, measuring: &Measuring, seed: u64) -> Discr
         });
         draw.motions.push(track);
     }
+    draw.complete.clone_from(&draw.motions);
     draw
 }
 
@@ -186,6 +199,6 @@ impl Differential<'_> {
             let mean = [p.xyd.z, p.flow_left.x, p.flow_left.y, p.flow_right_x].into();
             StereoFlow { measured: Gaussian { mean, cov: flow.measured.cov }, ..*flow }
         };
-        self.pixels.iter().zip(&self.motions).map(truth).collect()
+        self.pixels.iter().zip(&self.complete).map(truth).collect()
     }
 }

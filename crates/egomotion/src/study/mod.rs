@@ -10,6 +10,7 @@ pub mod real;
 pub mod sensitivity;
 pub mod table;
 pub mod tally;
+pub mod uncertainty;
 pub mod world;
 
 use serde::Serialize;

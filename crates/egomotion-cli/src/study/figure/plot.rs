@@ -1,6 +1,6 @@
 //! A panel of lines over two axes.
 
-use egomotion::study::figure::Axis;
+use egomotion::study::figure::{Axis, Layout};
 use egomotion::study::{Line, Point, Series};
 use maud::{Markup, html};
 
@@ -29,7 +29,7 @@ impl<'a> Plot<'a> {
         let across: Vec<f64> = points().map(|point| point.x).collect();
         let x = Ranged::across(x, &across);
         let seen = points().filter(|point| x.takes(point.x));
-        let upwards: Vec<f64> = seen.flat_map(|point| [Some(point.y), upper_end(point)]).flatten().collect();
+        let upwards: Vec<f64> = seen.flat_map(|point| ends(point, &y.layout)).collect();
         Self { y: Ranged::upwards(y, &upwards), x, series }
     }
 
@@ -62,7 +62,7 @@ impl<'a> Plot<'a> {
     pub fn extras(&self) -> (bool, bool) {
         let points =
             || self.series.iter().flat_map(|series| series.points.iter().map(move |p| (series.line, p)));
-        let bars = points().any(|(line, point)| line != Line::Reference && upper_end(point).is_some());
+        let bars = points().any(|(line, point)| line != Line::Reference && error(point).is_some());
         (bars, points().any(|(line, point)| line != Line::Reference && self.side(point) != 0))
     }
 
@@ -105,7 +105,7 @@ impl<'a> Plot<'a> {
 
     fn bars(&self, axes: &Axes, style: &Style, series: &Series) -> Markup {
         let bar = |point: &Point| {
-            let reach = 2.0 * point.standard_error.filter(|e| e.is_finite() && *e > 0.0)?;
+            let reach = 2.0 * error(point)?;
             let (x, _) = self.place(axes, point)?;
             let low = point.y - reach;
             // Below the least a logarithm can show, the bar goes on to the edge.
@@ -207,8 +207,15 @@ fn apart(ticks: &[(f64, String)], extent_of: impl Fn(&str) -> f64) -> Vec<(f64, 
     kept
 }
 
-/// Upper end of a point's bar.
-fn upper_end(point: &Point) -> Option<f64> {
-    let end = point.y + 2.0 * point.standard_error.filter(|e| e.is_finite() && *e > 0.0)?;
-    end.is_finite().then_some(end)
+/// A point's value, and the ends of its bar that the axis makes room for.
+fn ends(point: &Point, layout: &Layout) -> [f64; 3] {
+    let reach = 2.0 * error(point).unwrap_or(0.0);
+    // By a logarithm the lower end may be as far as one likes.
+    let low = if *layout == Layout::Log { point.y } else { point.y - reach };
+    [low, point.y, point.y + reach]
+}
+
+/// The standard error, where there is one to be drawn.
+fn error(point: &Point) -> Option<f64> {
+    point.standard_error.filter(|e| e.is_finite() && *e > 0.0)
 }

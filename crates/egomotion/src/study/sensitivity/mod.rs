@@ -1,6 +1,6 @@
 //! The sensitivity study of 7.1: six sweeps of what measurements suffer from, and one setting alone.
 
-pub mod figures;
+mod figures;
 pub mod setting;
 
 use std::convert::Infallible;
@@ -8,7 +8,6 @@ use std::convert::Infallible;
 use serde::{Deserialize, Serialize};
 
 use super::draw::Measuring;
-use super::tally::Tally;
 use super::{Cell, Publication, Study, Table};
 use crate::pipeline::Approach;
 use crate::sim::Sequence;
@@ -139,7 +138,6 @@ pub struct Record {
     /// The swept parameter's value, `inf` for no rounding; STEP for a single setting.
     pub value: String,
     /// Who, what, and how wrong.
-    #[serde(flatten)]
     pub score: Score,
 }
 
@@ -364,9 +362,4 @@ fn overview(methods: &[Record], bound: &[Record]) -> Table {
         seen.push(who);
     }
     table
-}
-
-/// Errors of a contender in a setting, for figures.
-fn tally<'a>(records: &'a [Record], is: impl Fn(&Record) -> bool) -> Option<&'a Tally> {
-    records.iter().find(|r| is(r)).map(|r| &r.score.tally)
 }

@@ -1,0 +1,172 @@
+//! The files of a rendered sequence; each appears whole or not at all.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use egomotion::geometry::{Grid, Twist};
+use egomotion_io::trajectory::{Pose, write_kitti, write_tum};
+use egomotion_io::{IoError, calibration, flo, image, pfm, write};
+use serde::Serialize;
+
+use super::world::{SceneFile, World};
+
+/// A folder that a rendered sequence goes to.
+pub struct SequenceFolder {
+    path: PathBuf,
+}
+
+/// Folders with one file a frame, and the files' extension; the motion's have none for the last frame.
+const FRAMES: [(&str, &str); 7] = [
+    ("image_0", "png"),
+    ("image_1", "png"),
+    ("truth/disparity", "pfm"),
+    ("truth/depth", "pfm"),
+    ("truth/visible", "png"),
+    ("truth/depth_velocity", "pfm"),
+    ("truth/flow", "flo"),
+];
+
+/// Files that tell of all frames.
+const COURSE: [&str; 4] = ["times.txt", "poses.txt", "truth/trajectory_tum.txt", "truth/motion.toml"];
+
+/// `truth/motion.toml`.
+#[derive(Serialize)]
+struct MotionFile<'a> {
+    sequence: &'a str,
+    step: f64,
+    frames: usize,
+    interval_s: f64,
+    motion: Vec<MotionRow>,
+}
+
+/// The motion that ends at a frame.
+#[derive(Serialize)]
+struct MotionRow {
+    frame: usize,
+    phi_left: [f64; 6],
+    phi_cyclopean: [f64; 6],
+}
+
+const MOTION_HEAD: &str = "\
+# Motion of the scene from the frame before to `frame`: tX, tY, tZ (metres) and ΩX, ΩY, ΩZ (radians) of φ, with
+# P' = R P + T and (R, T) = exp(φ). The camera moves by the inverse. X right, Y down, Z forward.
+";
+
+const SCENE_HEAD: &str = "\
+# Where the sequence takes place, and what sees it: egomotion simulate --sequence NAME --scene THIS_FILE.
+# The world's frame is that of the cyclopean camera, in the middle between left and right, at frame 0.
+";
+
+impl SequenceFolder {
+    /// Make the folders, and take away what will be written anew, so that an interrupted run leaves no mixture.
+    pub fn create(path: &Path, frames: usize) -> Result<Self> {
+        for (name, _) in FRAMES {
+            write::folder(&path.join(name))?;
+        }
+        let folder = Self { path: path.to_owned() };
+        folder.refuse_longer(frames)?;
+        let each =
+            FRAMES.iter().flat_map(|(name, extension)| (0..frames).map(|k| folder.file(name, k, extension)));
+        for file in each.chain(COURSE.map(|name| path.join(name))) {
+            match std::fs::remove_file(&file) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(IoError::system(&file, "replace", &error).into());
+                }
+                _ => {}
+            }
+        }
+        Ok(folder)
+    }
+
+    /// Frames of a longer sequence would be read as if they belonged to this one.
+    fn refuse_longer(&self, frames: usize) -> Result<()> {
+        for (name, _) in FRAMES {
+            let folder = self.path.join(name);
+            let failed = |error| IoError::system(&folder, "list", &error);
+            for entry in folder.read_dir().map_err(failed)? {
+                let file = entry.map_err(failed)?.path();
+                let number = file.file_stem().and_then(|stem| stem.to_str()?.parse::<usize>().ok());
+                if number.is_some_and(|number| number >= frames) {
+                    bail!(
+                        "{}: is not of this sequence of {frames} frames; remove the folder or choose another --out",
+                        file.display()
+                    );
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn file(&self, folder: &str, k: usize, extension: &str) -> PathBuf {
+        self.path.join(folder).join(format!("{k:06}.{extension}"))
+    }
+
+    /// `calib.txt` and `scene.toml`.
+    pub fn write_scene(&self, world: &World) -> Result<()> {
+        calibration::write(&self.path.join("calib.txt"), &world.sequence.rig)?;
+        let scene = SceneFile {
+            rig: Some(world.sequence.rig),
+            sensor: Some(world.sensor),
+            scene: world.sequence.scene.clone(),
+        };
+        self.write_toml("scene.toml", SCENE_HEAD, &scene)
+    }
+
+    /// The images and the maps of frame `k`.
+    pub fn write_frame(&self, world: &World, k: usize) -> Result<()> {
+        let (view, images) = world.sequence.view(k).zip(world.photograph(k)).context("no such frame")?;
+        // The last frame has no motion to a later one, even where the sequence would go on.
+        let phi = world.sequence.phi(k).filter(|_| k + 1 < world.frames);
+        let truth = view.truth_maps(phi.as_ref());
+        image::write_grey(&self.file("image_0", k, "png"), &images.left)?;
+        image::write_grey(&self.file("image_1", k, "png"), &images.right)?;
+        pfm::write(&self.file("truth/disparity", k, "pfm"), truth.shift.grid())?;
+        pfm::write(&self.file("truth/depth", k, "pfm"), truth.depth.grid())?;
+        let bits = truth.visible.values().iter().map(|&bits| f32::from(bits)).collect();
+        let (width, height) = truth.visible.size();
+        let bits = Grid::from_values(width, height, bits).context("a map of another size")?;
+        image::write_grey(&self.file("truth/visible", k, "png"), &bits)?;
+        if phi.is_some() {
+            pfm::write(&self.file("truth/depth_velocity", k, "pfm"), truth.depth_velocity.grid())?;
+            flo::write(&self.file("truth/flow", k, "flo"), &truth.flow)?;
+        }
+        Ok(())
+    }
+
+    /// Time stamps, poses and motions of the first `frames` frames.
+    pub fn write_course(&self, world: &World, frames: usize) -> Result<()> {
+        let sequence = &world.sequence;
+        let first = sequence.world_from_left(0).context("a sequence without a frame")?.inverse();
+        let pose = |k: usize| {
+            let world_from_camera = first.after(&sequence.world_from_left(k)?);
+            Some(Pose { time_s: Some(k as f64 * sequence.interval_s), world_from_camera })
+        };
+        let poses: Vec<Pose> = (0..frames).map_while(pose).collect();
+        let mut times = String::new();
+        for time_s in poses.iter().filter_map(|pose| pose.time_s) {
+            let _ = writeln!(times, "{time_s}");
+        }
+        write::bytes(&self.path.join("times.txt"), times.as_bytes())?;
+        write_kitti(&self.path.join("poses.txt"), &poses)?;
+        write_tum(&self.path.join("truth/trajectory_tum.txt"), &poses)?;
+        let row = |k: usize| {
+            let numbers = |phi: Twist| phi.vector().into();
+            let (left, cyclopean) = (sequence.phi(k)?, sequence.phi_cyclopean(k)?);
+            Some(MotionRow { frame: k + 1, phi_left: numbers(left), phi_cyclopean: numbers(cyclopean) })
+        };
+        let motion = MotionFile {
+            sequence: &sequence.name,
+            step: world.step,
+            frames,
+            interval_s: sequence.interval_s,
+            motion: (0..frames.saturating_sub(1)).map_while(row).collect(),
+        };
+        self.write_toml("truth/motion.toml", MOTION_HEAD, &motion)
+    }
+
+    fn write_toml(&self, name: &str, head: &str, value: &impl Serialize) -> Result<()> {
+        let text = toml::to_string(value).with_context(|| format!("cannot put {name} into TOML"))?;
+        Ok(write::bytes(&self.path.join(name), format!("{head}\n{text}").as_bytes())?)
+    }
+}
