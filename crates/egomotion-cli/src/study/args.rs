@@ -119,10 +119,10 @@ pub struct RealArgs {
     #[arg(long, value_name = "WxH", default_value = "320x240", conflicts_with = "source", value_parser = size)]
     pub size: (usize, usize),
     /// STEP: frames of a rendered sequence between two images of a draw.
-    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "source", value_parser = clap::value_parser!(u32).range(1..=64))]
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "source", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub step: u32,
     /// ROUND: levels of disparity in a pixel.
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(long, value_name = "N", default_value_t = 16, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub round: u32,
     /// φ is estimated from every N-th pixel in both directions [default: 2 rendered, 4 of a recording].
     #[arg(long, value_name = "N", value_parser = positive)]
@@ -264,7 +264,7 @@ mod tests {
             ("--size 320", "give width x height"),
             ("--size 0x0", "'0x0' for '--size <WxH>'"),
             ("--step 0", "--step <N>"),
-            ("--step -1", "--step"),
+            ("--step -1", "'-1' for '--step <N>'"),
             ("--frames 5", "<SOURCE>"),
             ("06 --sequences lab-A", "cannot be used with"),
         ] {
