@@ -205,7 +205,7 @@ fn step(text: &str) -> Result<f64, String> {
 }
 
 /// WxH.
-fn size(text: &str) -> Result<(usize, usize), String> {
+pub fn size(text: &str) -> Result<(usize, usize), String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or("give width x height, as 640x480")?;
     let side = |text: &str| text.parse::<usize>().map_err(|e| format!("{e}"));
     let size = (side(width)?, side(height)?);

@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 
 use egomotion::sim::Sequence;
 
-use crate::args::positive;
+use crate::args::{positive, size};
 
 /// The studies.
 #[derive(Debug, Subcommand)]
@@ -96,6 +96,17 @@ pub struct SensitivityArgs {
     pub laboratory: LaboratoryArgs,
 }
 
+impl SensitivityArgs {
+    /// The sequences in their order, each once.
+    pub fn sequences(&self) -> Vec<String> {
+        let asked = |name: &&str| self.sequences.iter().any(|typed| typed == name);
+        SEQUENCES.into_iter().filter(asked).map(str::to_owned).collect()
+    }
+}
+
+/// The paper's sequences.
+const SEQUENCES: [&str; 3] = ["A", "B", "C"];
+
 /// Section 7.2 on images.
 #[derive(Debug, Clone, Args)]
 pub struct RealArgs {
@@ -108,10 +119,10 @@ pub struct RealArgs {
     #[arg(long, value_name = "WxH", default_value = "320x240", conflicts_with = "source", value_parser = size)]
     pub size: (usize, usize),
     /// STEP: frames of a rendered sequence between two images of a draw.
-    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "source", value_parser = clap::value_parser!(u32).range(1..=64))]
+    #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "source", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub step: u32,
     /// ROUND: levels of disparity in a pixel.
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    #[arg(long, value_name = "N", default_value_t = 16, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub round: u32,
     /// φ is estimated from every N-th pixel in both directions [default: 2 rendered, 4 of a recording].
     #[arg(long, value_name = "N", value_parser = positive)]
@@ -131,17 +142,6 @@ pub struct RealArgs {
     #[command(flatten)]
     pub laboratory: LaboratoryArgs,
 }
-
-impl SensitivityArgs {
-    /// The sequences in their order, each once.
-    pub fn sequences(&self) -> Vec<String> {
-        let asked = |name: &&str| self.sequences.iter().any(|typed| typed == name);
-        SEQUENCES.into_iter().filter(asked).map(str::to_owned).collect()
-    }
-}
-
-/// The paper's sequences.
-const SEQUENCES: [&str; 3] = ["A", "B", "C"];
 
 /// Levels of disparity in a pixel; `None` where disparity is not rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,15 +166,6 @@ fn lab_name(text: &str) -> Result<String, String> {
     let known = Sequence::lab_names().find(|name| name.eq_ignore_ascii_case(text));
     let all = || Sequence::lab_names().collect::<Vec<_>>().join(", ");
     known.map(str::to_owned).ok_or_else(|| format!("must be of {}", all()))
-}
-
-/// Smaller images hold no patch that could be matched, larger ones no memory.
-const SIDES: std::ops::RangeInclusive<usize> = 64..=4096;
-
-fn size(text: &str) -> Result<(usize, usize), String> {
-    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    let fits = |(w, h): &(usize, usize)| SIDES.contains(w) && SIDES.contains(h);
-    sides.filter(fits).ok_or_else(|| "must be WIDTHxHEIGHT, each 64 to 4096 pixels".into())
 }
 
 fn above_zero(text: &str) -> Result<f64, String> {
@@ -241,6 +232,16 @@ mod tests {
         assert_eq!(args.laboratory.folder(None), Path::new("egomotion-out/study"));
     }
 
+    #[test]
+    fn sequences_are_swept_once_each() {
+        let sequences = |words: &[&str]| {
+            TypedSweeps::try_parse_from([&["sensitivity"], words].concat()).map(|t| t.sweeps.sequences())
+        };
+        assert_eq!(sequences(&[]).unwrap(), ["A", "B", "C"]);
+        assert_eq!(sequences(&["--sequence", "c,A,C"]).unwrap(), ["A", "C"]);
+        assert_eq!(sequences(&["--sequence", "A,D"]).unwrap_err().exit_code(), 2);
+    }
+
     #[derive(Debug, Parser)]
     struct TypedReal {
         #[command(flatten)]
@@ -260,26 +261,16 @@ mod tests {
         assert_eq!((args.source.unwrap().to_str(), args.frames, args.stride), (Some("drive/06"), 20, 2));
         for (options, words) in [
             ("--sequences lab-K", "must be of lab-A, lab-B"),
-            ("--size 320", "must be WIDTHxHEIGHT"),
-            ("--size 0x0", "must be WIDTHxHEIGHT"),
+            ("--size 320", "give width x height"),
+            ("--size 0x0", "'0x0' for '--size <WxH>'"),
             ("--step 0", "--step <N>"),
-            ("--step -1", "--step"),
+            ("--step -1", "'-1' for '--step <N>'"),
             ("--frames 5", "<SOURCE>"),
             ("06 --sequences lab-A", "cannot be used with"),
         ] {
             let error = typed(options).expect_err(options);
             assert!(error.contains(words), "{options}: {error}");
         }
-    }
-
-    #[test]
-    fn sequences_are_swept_once_each() {
-        let sequences = |words: &[&str]| {
-            TypedSweeps::try_parse_from([&["sensitivity"], words].concat()).map(|t| t.sweeps.sequences())
-        };
-        assert_eq!(sequences(&[]).unwrap(), ["A", "B", "C"]);
-        assert_eq!(sequences(&["--sequence", "c,A,C"]).unwrap(), ["A", "C"]);
-        assert_eq!(sequences(&["--sequence", "A,D"]).unwrap_err().exit_code(), 2);
     }
 
     #[test]

@@ -40,6 +40,7 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
             // Its draws are of another kind and number.
             laboratory.run(&uncertainty(&LaboratoryArgs { draws: None, ..args.clone() }))?;
             laboratory.run(&sensitivity(args, Sensitivity::default().sequences))?;
+            // As many textures as it has by itself.
             laboratory.run(&LabStudy { first_seed: args.seed, ..LabStudy::default() })?;
             laboratory.close()
         }

@@ -99,5 +99,9 @@ fn what_has_no_meaning_is_refused() {
     fs::write(&file, "in the way").unwrap();
     assert_refused(&call("study table --sequence A --draws 1", &file), 1, &["file"]);
     let none = folder.path().join("none");
-    assert_refused(&call(&format!("study real {}", none.display()), &folder.path().join("real")), 1, &["none"]);
+    assert_refused(
+        &call(&format!("study real {}", none.display()), &folder.path().join("real")),
+        1,
+        &["none"],
+    );
 }
