@@ -22,6 +22,8 @@ pub enum StudyCommand {
     /// Without SOURCE the sequences lab-A … lab-M are rendered and go through the whole image pipeline. SOURCE is a
     /// folder in KITTI odometry layout with true poses (poses.txt, or ../../poses/NAME.txt).
     Real(RealArgs),
+    /// Sections 1, 3.1 and 4.3: depth against brightness, and instantaneous formulas on finite motions.
+    Assumptions(LaboratoryArgs),
     /// Every study, with one page that links them.
     All(LaboratoryArgs),
 }

@@ -14,6 +14,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Result;
+use egomotion::study::assumptions::Assumptions;
 use egomotion::study::draw::Measuring;
 use egomotion::study::real::LabStudy;
 use egomotion::study::sensitivity::{OneSetting, Sensitivity};
@@ -35,6 +36,7 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
         }
         StudyCommand::Uncertainty(args) => alone(args, &uncertainty(args)),
         StudyCommand::Real(args) => real::run(args),
+        StudyCommand::Assumptions(args) => alone(args, &Assumptions { seed: args.seed }),
         StudyCommand::All(args) => {
             let mut laboratory = open(args, None, Some("The paper's studies, repeated"))?;
             // Its draws are of another kind and number.
@@ -42,6 +44,7 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
             laboratory.run(&sensitivity(args, Sensitivity::default().sequences))?;
             // As many textures as it has by itself.
             laboratory.run(&LabStudy { first_seed: args.seed, ..LabStudy::default() })?;
+            laboratory.run(&Assumptions { seed: args.seed })?;
             laboratory.close()
         }
     }

@@ -3,6 +3,7 @@
 //! A [`Study`] is a list of independent parts; each part gives records, and the records of all parts give
 //! tables and figures as plain values ([`Publication`]). Files, pages and progress are the command's.
 
+pub mod assumptions;
 pub mod contender;
 pub mod draw;
 pub mod figure;

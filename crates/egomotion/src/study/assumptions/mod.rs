@@ -1,0 +1,71 @@
+//! What the paper takes for granted: depth is better than brightness (1, 3.1), and a small motion is instantaneous (4.3).
+
+mod brightness;
+mod instantaneous;
+
+use std::convert::Infallible;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Publication, Study};
+pub use brightness::BrightnessError;
+pub use instantaneous::InstantaneousError;
+
+/// `study assumptions`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Assumptions {
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+/// What a part finds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Finding {
+    /// φ from depth and from brightness.
+    Brightness(BrightnessError),
+    /// Formulas for instants on finite motions.
+    Instantaneous(InstantaneousError),
+}
+
+impl Study for Assumptions {
+    type Record = Finding;
+    type Error = Infallible;
+
+    fn name(&self) -> &'static str {
+        "assumptions"
+    }
+
+    fn parts(&self) -> Vec<String> {
+        let brightness =
+            brightness::STEPS.iter().map(|step| format!("depth against brightness, STEP {step}"));
+        brightness.chain(["instantaneous motion".to_owned()]).collect()
+    }
+
+    fn run(&self, part: usize) -> Result<Vec<Finding>, Infallible> {
+        Ok(match brightness::STEPS.get(part) {
+            Some(&step) => brightness::errors(step, self.seed).into_iter().map(Finding::Brightness).collect(),
+            None => instantaneous::errors().into_iter().map(Finding::Instantaneous).collect(),
+        })
+    }
+
+    fn publish(&self, records: &[Finding]) -> Publication {
+        let brightness: Vec<&BrightnessError> = records.iter().filter_map(Finding::brightness).collect();
+        let instants: Vec<&InstantaneousError> = records.iter().filter_map(Finding::instantaneous).collect();
+        Publication {
+            title: "What the paper takes for granted".to_owned(),
+            data: vec![brightness::table(&brightness), instantaneous::table(&instants)],
+            tables: Vec::new(),
+            figures: vec![brightness::figure(&brightness), instantaneous::figure(&instants)],
+        }
+    }
+}
+
+impl Finding {
+    fn brightness(&self) -> Option<&BrightnessError> {
+        if let Self::Brightness(error) = self { Some(error) } else { None }
+    }
+
+    fn instantaneous(&self) -> Option<&InstantaneousError> {
+        if let Self::Instantaneous(error) = self { Some(error) } else { None }
+    }
+}
