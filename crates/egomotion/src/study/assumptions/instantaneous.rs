@@ -96,24 +96,26 @@ pub(super) fn table(errors: &[&InstantaneousError]) -> Table {
     table
 }
 
+/// One kind of line in a panel: what its name ends in, its values, how it is drawn.
+type Kind<'a> = (&'a str, &'a dyn Fn(&InstantaneousError) -> Option<f64>, Line);
+
 pub(super) fn figure(errors: &[&InstantaneousError]) -> Figure {
-    let panel =
-        |title: &str, name: &str, lines: &[(&str, &dyn Fn(&InstantaneousError) -> Option<f64>, Line)]| {
-            let of = |sequence: &'static str| {
-                lines.iter().map(move |(suffix, value, line)| {
-                    let points = errors.iter().filter(|e| e.sequence == sequence).filter_map(|e| {
-                        let y = value(e).filter(|y| *y > 0.0)?;
-                        Some(Point { x: e.step, y, standard_error: None })
-                    });
-                    Series { name: format!("{sequence}{suffix}"), line: *line, points: points.collect() }
-                })
-            };
-            let series = ["A", "B", "C"].into_iter().flat_map(of).filter(|s| !s.points.is_empty());
-            Panel {
-                title: title.to_owned(),
-                content: Content::Plot { x: Axis::log("STEP"), y: Axis::log(name), series: series.collect() },
-            }
+    let panel = |title: &str, name: &str, lines: &[Kind<'_>]| {
+        let of = |sequence: &'static str| {
+            lines.iter().map(move |(suffix, value, line)| {
+                let points = errors.iter().filter(|e| e.sequence == sequence).filter_map(|e| {
+                    let y = value(e).filter(|y| *y > 0.0)?;
+                    Some(Point { x: e.step, y, standard_error: None })
+                });
+                Series { name: format!("{sequence}{suffix}"), line: *line, points: points.collect() }
+            })
         };
+        let series = ["A", "B", "C"].into_iter().flat_map(of).filter(|s| !s.points.is_empty());
+        Panel {
+            title: title.to_owned(),
+            content: Content::Plot { x: Axis::log("STEP"), y: Axis::log(name), series: series.collect() },
+        }
+    };
     Figure {
         id: "figure-instantaneous".to_owned(),
         title: "Section 4.3. When the formulas for an instant may be used on finite motions".to_owned(),
