@@ -47,18 +47,10 @@ const YARDSTICK_A: [Row; 7] = [
     (("discrete", "ml", "ml"), [NONE, 1.55, 0.042, 0.038, 1.56, 0.001, 0.001, 0.001]),
 ];
 
-/// Half a unit of the last digit that a yardstick is printed with: three significant digits, two below 10.
+/// Half a unit of the last digit that a yardstick is printed with.
 fn printed_to(value: f64) -> f64 {
-    let digits = if value >= 100.0 {
-        0
-    } else if value >= 10.0 {
-        1
-    } else if value >= 0.1 {
-        2
-    } else {
-        4
-    };
-    0.5 * 10f64.powi(-digits)
+    let decimals = (0..4).find(|&d| (value * 10f64.powi(d)).fract().abs() < 1e-9).unwrap_or(4);
+    0.5 * 10f64.powi(-decimals)
 }
 
 fn agrees(ours: &[Score], yardstick: &[Row]) {

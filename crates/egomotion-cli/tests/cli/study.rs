@@ -94,7 +94,7 @@ fn what_has_no_meaning_is_refused() {
         assert_eq!((ended.code, ended.stdout.as_str()), (2, ""), "{options}: {}", ended.stderr);
     }
     let far = call("study table --sequence C --step 1e6 --draws 1", &folder.path().join("far"));
-    assert_refused(&far, 1, &["STEP 1000000", "no pixel"]);
+    assert_refused(&far, 1, &["STEP 1000000", "leave the room"]);
     let file = folder.path().join("file");
     fs::write(&file, "in the way").unwrap();
     assert_refused(&call("study table --sequence A --draws 1", &file), 1, &["file"]);

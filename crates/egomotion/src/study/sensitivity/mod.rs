@@ -38,9 +38,9 @@ pub enum SensitivityError {
     /// There is no such sequence.
     #[error("there is no sequence {0}")]
     Sequence(String),
-    /// The motion is so large that no pixel keeps its surface.
-    #[error("sequence {sequence} at STEP {step}: no pixel sees the same surface before and after")]
-    NothingUsable {
+    /// The motion is so large that the cameras leave the room.
+    #[error("sequence {sequence} at STEP {step}: the cameras leave the room or enter a part of it")]
+    OutOfRoom {
         /// The sequence.
         sequence: String,
         /// STEP.
@@ -321,12 +321,11 @@ impl Study for OneSetting {
             score,
         };
         let approaches = [Approach::Differential, Approach::Discrete];
-        let records: Vec<Record> = setting.scores(range, &approaches).into_iter().map(record).collect();
-        if records.is_empty() {
+        if setting.clearance_m().partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
             let (sequence, step) = (self.sequence.clone(), self.step);
-            return Err(SensitivityError::NothingUsable { sequence, step });
+            return Err(SensitivityError::OutOfRoom { sequence, step });
         }
-        Ok(records)
+        Ok(setting.scores(range, &approaches).into_iter().map(record).collect())
     }
 
     fn publish(&self, records: &[Record]) -> Publication {

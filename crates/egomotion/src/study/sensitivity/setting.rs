@@ -10,7 +10,7 @@ use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
 use crate::metrics::quantile;
 use crate::motion::depth_velocity::{self, DisparityOffset, RigidPrediction};
 use crate::pipeline::{Approach, EstimatorKind, Method};
-use crate::sim::Sequence;
+use crate::sim::{Sequence, reference_pose};
 use crate::study::contender::{Contender, approach_name};
 use crate::study::draw::{self, Measuring};
 use crate::study::tally::Tally;
@@ -57,6 +57,20 @@ pub struct Setting<'a> {
 }
 
 impl Setting<'_> {
+    /// Least distance from the rig's centre to a surface at t − 1, t and t + 1 of every pose, in metres.
+    ///
+    /// Negative where it has left the room or entered a part.
+    pub fn clearance_m(&self) -> f64 {
+        let Some(phi) = self.sequence.phi_cyclopean(0) else { return f64::INFINITY };
+        let moved = phi.scaled(self.step).exp();
+        let at = |pose: i32| {
+            let now = reference_pose(&phi, pose);
+            [now, now.after(&moved), now.after(&moved.inverse())]
+        };
+        let clearance = |pose: RigidMotion| self.sequence.scene.clearance_m(&pose.translation);
+        POSES.into_iter().flat_map(at).map(clearance).fold(f64::INFINITY, f64::min)
+    }
+
     /// Scores of the draws in `range`, in a fixed order; draw i is taken at the pose i mod 5.
     pub fn scores(&self, range: std::ops::Range<usize>, approaches: &[Approach]) -> Vec<Score> {
         let Some(phi) = self.sequence.phi_cyclopean(0) else { return Vec::new() };
