@@ -49,7 +49,7 @@ pub fn common_errors<M: Measurement>(
         let Some(l) = observation.linearise(&mut observation.structure(), &at) else { continue };
         let shifted = observation.with_disparity_offset(OFFSET_STEP_PX);
         let Some(s) = shifted.linearise(&mut shifted.structure(), &at) else { continue };
-        let Some(inverse) = l.weight() else { continue };
+        let inverse = l.inverse_cov;
         let weight = kernel.weight(l.misclosure.dot(&(inverse * l.misclosure)) / scale2, 3.0);
         let weighted = weight * l.by_phi.transpose() * inverse;
         information += weighted * l.by_phi;
