@@ -14,7 +14,7 @@ use super::alignment::{Form, Moments, PointPair};
 use super::blocks::{self, BlockScore, Blocks};
 use super::lmeds::{random_subsets, trials};
 use super::m_estimator::{LEAST_SCALE2, StudentT};
-use super::measurement::{At, Linearised, Measurement};
+use super::measurement::{At, Linearised, Measurement, product};
 use super::{Estimate, MotionEstimate, Observability, Unsolvable, median};
 use crate::geometry::{Gaussian, StereoRig, Twist};
 use crate::observe::StereoTrack;
@@ -66,12 +66,12 @@ impl Step {
         let inverse = l.inverse_cov;
         let q = l.misclosure.dot(&(inverse * l.misclosure));
         let weight = kernel.weight(q / scale2, 3.0);
-        let weighted = l.by_phi.transpose() * inverse;
-        let (information, score) = (weighted * l.by_phi, weighted * l.misclosure);
+        let weighted = product(&l.by_phi.transpose(), &inverse);
+        let (information, score) = (product(&weighted, &l.by_phi), product(&weighted, &l.misclosure));
         self.score.information += weight * information;
         self.score.score += weight * score;
-        self.bread +=
-            weight * information - kernel.curvature(q / scale2, 3.0) / scale2 * score * score.transpose();
+        self.bread += weight * information
+            - kernel.curvature(q / scale2, 3.0) / scale2 * product(&score, &score.transpose());
         self.weighted_square += weight * q;
         self.square += q;
         self.used += 1;

@@ -29,6 +29,25 @@ pub struct Linearised {
     pub(super) by_phi: SMatrix<f64, 3, 6>,
 }
 
+/// A B, in place of the library's product for matrices of any size, which costs twice as much for those as small as here.
+#[inline(always)]
+pub(super) fn product<const N: usize, const K: usize, const M: usize>(
+    a: &SMatrix<f64, N, K>,
+    b: &SMatrix<f64, K, M>,
+) -> SMatrix<f64, N, M> {
+    let mut out = [[0.0; N]; M];
+    // Stored by columns.
+    let (a, b) = (&a.data.0, &b.data.0);
+    for m in 0..M {
+        for k in 0..K {
+            for n in 0..N {
+                out[m][n] += a[k][n] * b[m][k];
+            }
+        }
+    }
+    SMatrix::from_data(nalgebra::ArrayStorage(out))
+}
+
 /// S⁻¹ by cofactors; `None` unless S is positive definite, which rounding or a careless caller may break.
 fn inverse(s: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let [a, b, c] =
@@ -81,11 +100,11 @@ impl Measurement for StereoTrack {
     fn linearise(&self, s: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised> {
         let moved = at.motion.apply(&at.rig.point(s)?);
         let by_moved = at.rig.project_jacobian(&moved);
-        let by_structure = by_moved * at.motion.rotation * at.rig.point_jacobian(s);
+        let by_structure = product(&product(&by_moved, &at.motion.rotation), &at.rig.point_jacobian(s));
         let predicted = at.rig.project(&moved)?;
         let misclosure = self.after.mean - predicted - by_structure * (self.before.mean - *s);
-        let gain = self.before.cov * by_structure.transpose();
-        let cov = self.after.cov + by_structure * gain;
+        let gain = product(&self.before.cov, &by_structure.transpose());
+        let cov = self.after.cov + product(&by_structure, &gain);
         let inverse_cov = inverse(&cov)?;
         let pull = inverse_cov * misclosure;
         let shift = gain * pull;
@@ -94,7 +113,8 @@ impl Measurement for StereoTrack {
         if improved.z > 0.1 * s.z {
             *s = improved;
         }
-        let by_phi = by_moved * RigidMotion::point_jacobian(&moved) * at.left_jacobian;
+        let by_motion = product(&by_moved, &RigidMotion::point_jacobian(&moved));
+        let by_phi = product(&by_motion, &at.left_jacobian);
         Some(Linearised { misclosure, inverse_cov, by_phi })
     }
 

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::dispatch::widest;
+use super::dispatch::vectorised;
 use crate::geometry::{Grid, Image};
 
 /// Half the side of the window over which the structure tensor is summed, in pixels.
@@ -121,24 +121,23 @@ fn best_of_columns(
     let row_of_products = |row: usize, products: &mut [f32]| {
         let source = [row - 1, row, row + 1].map(|r| &image.row(r)[first..first + span + 2]);
         let slot = &mut products[(row % SIDE) * 3 * span..][..3 * span];
-        widest(|| derivative_products(source, slot));
+        derivative_products(source, slot);
     };
     for row in rows.start - RADIUS..rows.start + RADIUS {
         row_of_products(row, &mut products);
     }
     for v in rows {
         row_of_products(v + RADIUS, &mut products);
-        widest(|| {
-            sum_of_slots(&products, &mut sums);
-            strongest_so_far(&sums, v as f32, &mut best);
-        });
+        sum_of_slots(&products, &mut sums);
+        strongest_so_far(&sums, v as f32, &mut best.strength, &mut best.row);
     }
     best
 }
 
+vectorised! {
 /// u², u v and v² of Scharr's derivatives of a row, ½(−1 0 1) along and (3 10 3)/16 across, one after the other.
-#[inline(always)]
-fn derivative_products([above, here, below]: [&[f32]; 3], out: &mut [f32]) {
+derivative_products(source: [&[f32]; 3], out: &mut [f32]) {
+    let [above, here, below] = source;
     let span = out.len() / 3;
     let (uu, rest) = out.split_at_mut(span);
     let (uv, vv) = rest.split_at_mut(span);
@@ -154,26 +153,28 @@ fn derivative_products([above, here, below]: [&[f32]; 3], out: &mut [f32]) {
         vv[i] = dv * dv;
     }
 }
+}
 
-#[inline(always)]
-fn sum_of_slots(products: &[f32], sums: &mut [f32]) {
+vectorised! {
+sum_of_slots(products: &[f32], sums: &mut [f32]) {
     let n = sums.len();
     let slot: [&[f32]; SIDE] = std::array::from_fn(|k| &products[k * n..(k + 1) * n]);
     for (i, sum) in sums.iter_mut().enumerate() {
         *sum = (slot[0][i] + slot[1][i]) + (slot[2][i] + slot[3][i]) + (slot[4][i] + slot[5][i]) + slot[6][i];
     }
 }
+}
 
+vectorised! {
 /// Smaller eigenvalues of the windowed structure tensor along a row, kept where they beat the rows above.
-#[inline(always)]
-fn strongest_so_far(sums: &[f32], row: f32, best: &mut Best) {
-    let n = best.strength.len();
+strongest_so_far(sums: &[f32], row: f32, best: &mut [f32], rows: &mut [f32]) {
+    let n = best.len();
     let span = n + 2 * RADIUS;
     let [uu, uv, vv] = [0, 1, 2].map(|k| &sums[k * span..(k + 1) * span]);
     let window =
         |s: &[f32], i: usize| (s[i] + s[i + 1]) + (s[i + 2] + s[i + 3]) + (s[i + 4] + s[i + 5]) + s[i + 6];
-    let rows = &mut best.row[..n];
-    for (i, strength) in best.strength.iter_mut().enumerate() {
+    let rows = &mut rows[..n];
+    for (i, strength) in best.iter_mut().enumerate() {
         let (a, b, c) = (window(uu, i), window(uv, i), window(vv, i));
         let half_difference = 0.5 * (a - c);
         let smaller = 0.5 * (a + c) - (half_difference * half_difference + b * b).sqrt();
@@ -182,6 +183,7 @@ fn strongest_so_far(sums: &[f32], row: f32, best: &mut Best) {
         *strength = if better { smaller } else { *strength };
         rows[i] = if better { row } else { rows[i] };
     }
+}
 }
 
 #[cfg(test)]

@@ -3,9 +3,9 @@
 //! Inverse-compositional Lucas–Kanade on images given as spline coefficients ([`super::spline`]).
 //! Both windows are reduced to zero mean and equal contrast, so that gain and offset between cameras or exposures do not matter.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Matrix2;
 
-use super::dispatch::widest;
+use super::dispatch::vectorised;
 use super::window::{self, LANES, SIDE, Window};
 use crate::geometry::Image;
 
@@ -57,13 +57,13 @@ pub struct Located {
 impl Patch {
     /// The window of an image (as spline coefficients) around (u, v), in pixels; `None` near the border or without any contrast.
     pub fn new(image: &Image, u: f64, v: f64) -> Option<Self> {
-        widest(|| Self::from_wide(&window::sample(image, u, v)?))
+        plain_patch(image, u, v)
     }
 
     /// The same of the image magnified by `scale` around (u, v): what another image that shows the
     /// surface so much larger is compared with.
     pub fn magnified(image: &Image, u: f64, v: f64, scale: f64) -> Option<Self> {
-        widest(|| Self::from_wide(&window::sample_spaced(image, u, v, scale.recip())?))
+        spaced_patch(image, u, v, scale.recip())
     }
 
     /// From the window with the margin of a pixel that its gradient needs.
@@ -136,38 +136,12 @@ impl Patch {
         if !inverse.iter().all(|x| x.is_finite()) {
             return None;
         }
-        widest(|| self.descend(image, start, &inverse, settling))
-    }
-
-    #[inline(always)]
-    fn descend(
-        &self,
-        image: &Image,
-        (mut u, mut v): (f64, f64),
-        inverse: &Matrix2<f64>,
-        settling: Settling,
-    ) -> Option<Located> {
-        for _ in 0..settling.iterations {
-            let mut there: Window = window::sample(image, u, v)?;
-            let contrast = standardise(&mut there)?;
-            // Contrasts may differ between cameras, but not by this much if it is the same surface.
-            let gain = self.contrast / contrast;
-            if !(0.33..3.0).contains(&gain) {
-                return None;
-            }
-            let (pull, square) = self.pull(&there, gain);
-            let step = inverse * pull;
-            (u, v) = (u + step.x, v + step.y);
-            if step.norm() < settling.step_px {
-                return Some(Located { u, v, residual: square / f64::from(AREA) });
-            }
-        }
-        None
+        descend(self, image, start, &inverse, settling)
     }
 
     /// Σ ∇I ΔI and Σ ΔI² of the difference ΔI from another window of which the contrast is multiplied by `gain`.
     #[inline(always)]
-    fn pull(&self, there: &Window, gain: f32) -> (Vector2<f64>, f64) {
+    fn pull(&self, there: &Window, gain: f32) -> ((f64, f64), f64) {
         let (mut u, mut v, mut square) = ([0.0_f32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
         for row in 0..SIDE {
             let (value, there) = (&self.values[row], &there[row]);
@@ -179,14 +153,62 @@ impl Patch {
                 square[i] += difference * difference;
             }
         }
-        (Vector2::new(total(&u), total(&v)), total(&square))
+        ((total(&u), total(&v)), total(&square))
     }
+}
+
+vectorised! {
+plain_patch(image: &Image, u: f64, v: f64) -> Option<Patch> {
+    Patch::from_wide(&window::sample(image, u, v)?)
+}
+}
+
+vectorised! {
+spaced_patch(image: &Image, u: f64, v: f64, spacing: f64) -> Option<Patch> {
+    Patch::from_wide(&window::sample_spaced(image, u, v, spacing)?)
+}
+}
+
+vectorised! {
+/// Gauss–Newton from a start, with the inverse of the patch's tensor.
+descend(
+    patch: &Patch,
+    image: &Image,
+    start: (f64, f64),
+    inverse: &Matrix2<f64>,
+    settling: Settling,
+) -> Option<Located> {
+    let (mut u, mut v) = start;
+    for _ in 0..settling.iterations {
+        let mut there: Window = window::sample(image, u, v)?;
+        let contrast = standardise(&mut there)?;
+        // Contrasts may differ between cameras, but not by this much if it is the same surface.
+        let gain = patch.contrast / contrast;
+        if !(0.33..3.0).contains(&gain) {
+            return None;
+        }
+        let (pull, square) = patch.pull(&there, gain);
+        let step = (
+            inverse.m11 * pull.0 + inverse.m12 * pull.1,
+            inverse.m21 * pull.0 + inverse.m22 * pull.1,
+        );
+        (u, v) = (u + step.0, v + step.1);
+        if step.0.hypot(step.1) < settling.step_px {
+            return Some(Located { u, v, residual: square / f64::from(AREA) });
+        }
+    }
+    None
+}
 }
 
 /// Sum over the lanes that belong to the window.
 #[inline(always)]
 fn total(lanes: &[f32; LANES]) -> f64 {
-    f64::from(lanes[..SIDE].iter().sum::<f32>())
+    let mut sum = 0.0;
+    for lane in &lanes[..SIDE] {
+        sum += lane;
+    }
+    f64::from(sum)
 }
 
 /// Reduce to zero mean; the standard deviation, or `None` if it vanishes.

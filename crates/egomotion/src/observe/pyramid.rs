@@ -1,6 +1,6 @@
 //! Image pyramid and image gradients, computed once per frame and shared by flow and tracks.
 
-use super::dispatch::widest;
+use super::dispatch::vectorised;
 use crate::geometry::{Grid, Image};
 use rayon::prelude::*;
 
@@ -105,13 +105,14 @@ fn smooth_into(image: &Image, out: &mut Image) {
         || vec![0.0_f32; width + 2],
         |line, y, out| {
             let rows = [image.row(y.saturating_sub(1)), image.row(y), image.row((y + 1).min(height - 1))];
-            widest(|| smooth_row(rows, line, out));
+            smooth_row(rows, line, out);
         },
     );
 }
 
-#[inline(always)]
-fn smooth_row([above, here, below]: [&[f32]; 3], line: &mut [f32], out: &mut [f32]) {
+vectorised! {
+smooth_row(rows: [&[f32]; 3], line: &mut [f32], out: &mut [f32]) {
+    let [above, here, below] = rows;
     let width = out.len();
     for (((s, &a), &h), &b) in line[1..=width].iter_mut().zip(above).zip(here).zip(below) {
         *s = 0.25 * (a + b) + 0.5 * h;
@@ -121,6 +122,7 @@ fn smooth_row([above, here, below]: [&[f32]; 3], line: &mut [f32], out: &mut [f3
     for (((o, &l), &c), &r) in out.iter_mut().zip(left).zip(&line[1..=width]).zip(right) {
         *o = 0.25 * (l + r) + 0.5 * c;
     }
+}
 }
 
 /// Smooth by the binomial (1 4 6 4 1)/16 and keep every second pixel.
@@ -133,13 +135,13 @@ fn halve_into(image: &Image, half: &mut Image) {
         |line, y, out| {
             let row = |dy: usize| image.row((2 * y + dy).saturating_sub(2).min(height - 1));
             let rows = [row(0), row(1), row(2), row(3), row(4)];
-            widest(|| halve_row(rows, line, out));
+            halve_row(rows, line, out);
         },
     );
 }
 
-#[inline(always)]
-fn halve_row(rows: [&[f32]; 5], line: &mut [f32], out: &mut [f32]) {
+vectorised! {
+halve_row(rows: [&[f32]; 5], line: &mut [f32], out: &mut [f32]) {
     let width = rows[0].len();
     let rows = rows.map(|row| &row[..width]);
     for (x, s) in line[2..width + 2].iter_mut().enumerate() {
@@ -155,6 +157,7 @@ fn halve_row(rows: [&[f32]; 5], line: &mut [f32], out: &mut [f32]) {
     for (((o, a), b), c) in out.iter_mut().zip(a).zip(b).zip(c) {
         *o = (a[0] + c[0] + 4.0 * (a[1] + b[1]) + 6.0 * b[0]) / 16.0;
     }
+}
 }
 
 /// Derivatives of an image.

@@ -1,6 +1,6 @@
 //! The disparity of a corner without any prior: a search along its row at half resolution.
 
-use super::dispatch::widest;
+use super::dispatch::vectorised;
 use super::stereo_pyramid::StereoPyramid;
 use crate::geometry::Image;
 
@@ -26,7 +26,7 @@ pub fn search_row(frame: &StereoPyramid, u: usize, v: usize, largest_px: usize) 
     }
     let most = (largest_px / size).min(u - RADIUS);
     let mut costs = vec![0.0; (most + 1).next_multiple_of(LANES)];
-    widest(|| all_costs(left, right, (u, v), most, &mut costs))?;
+    all_costs(left, right, (u, v), most, &mut costs)?;
     costs.truncate(most + 1);
     // The first cost belongs to the largest shift.
     let best = (0..costs.len()).rev().min_by(|&a, &b| costs[a].total_cmp(&costs[b]))?;
@@ -35,15 +35,10 @@ pub fn search_row(frame: &StereoPyramid, u: usize, v: usize, largest_px: usize) 
     (costs[best] < UNIQUENESS * rival).then_some(((most - best) * size) as f64)
 }
 
+vectorised! {
 /// Costs of the shifts from `most` down to 0; what lies beyond has no meaning.
-#[inline(always)]
-fn all_costs(
-    left: &Image,
-    right: &Image,
-    (u, v): (usize, usize),
-    most: usize,
-    costs: &mut [f32],
-) -> Option<()> {
+all_costs(left: &Image, right: &Image, at: (usize, usize), most: usize, costs: &mut [f32]) -> Option<()> {
+    let (u, v) = at;
     let mut window = [[0.0_f32; SIDE]; SIDE];
     let mut sum = 0.0;
     for (k, window) in window.iter_mut().enumerate() {
@@ -80,6 +75,7 @@ fn all_costs(
         }
     }
     Some(())
+}
 }
 
 #[cfg(test)]

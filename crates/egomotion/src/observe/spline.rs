@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::dispatch::widest;
+use super::dispatch::vectorised;
 use super::pyramid::fill_rows;
 use crate::geometry::{Grid, Image};
 
@@ -19,6 +19,7 @@ const STRIP: usize = 64;
 const REACH: usize = 12;
 
 /// Weights of the four coefficients around the fraction `t` (0 … 1) of a pixel.
+#[inline(always)]
 pub fn weights(t: f32) -> [f32; 4] {
     let (s, t2) = (1.0 - t, t * t);
     let (a, d) = (s * s * s / 6.0, t2 * t / 6.0);
@@ -83,17 +84,23 @@ pub fn smoothed_coefficients(image: &Image, out: &mut Image) {
         |line, v, out| {
             let row = |k: usize| image.row(reflected(v as isize + k as isize - TAPS as isize, height));
             let rows: [&[f32]; 2 * TAPS + 1] = std::array::from_fn(row);
-            widest(|| {
-                weighted_sum(&rows, &taps, &mut line[TAPS..TAPS + width]);
-                for k in 1..=TAPS {
-                    line[TAPS - k] = line[TAPS + reflected(-(k as isize), width)];
-                    line[TAPS + width - 1 + k] = line[TAPS + reflected((width - 1 + k) as isize, width)];
-                }
-                let shifted: [&[f32]; 2 * TAPS + 1] = std::array::from_fn(|k| &line[k..k + width]);
-                weighted_sum(&shifted, &taps, out);
-            });
+            filter_row(&rows, &taps, line, out);
         },
     );
+}
+
+vectorised! {
+/// Down the columns, then along the row.
+filter_row(rows: &[&[f32]; 2 * TAPS + 1], taps: &[f32; TAPS + 1], line: &mut [f32], out: &mut [f32]) {
+    let width = out.len();
+    weighted_sum(rows, taps, &mut line[TAPS..TAPS + width]);
+    for k in 1..=TAPS {
+        line[TAPS - k] = line[TAPS + reflected(-(k as isize), width)];
+        line[TAPS + width - 1 + k] = line[TAPS + reflected((width - 1 + k) as isize, width)];
+    }
+    let shifted: [&[f32]; 2 * TAPS + 1] = std::array::from_fn(|k| &line[k..k + width]);
+    weighted_sum(&shifted, taps, out);
+}
 }
 
 /// Σ of lines with symmetric weights, the middle one's first.
