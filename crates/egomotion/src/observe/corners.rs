@@ -168,22 +168,48 @@ sum_of_slots(products: &[f32], sums: &mut [f32]) {
 vectorised! {
 /// Smaller eigenvalues of the windowed structure tensor along a row, kept where they beat the rows above.
 strongest_so_far(sums: &[f32], row: f32, best: &mut [f32], rows: &mut [f32]) {
-    let n = best.len();
-    let span = n + 2 * RADIUS;
-    let [uu, uv, vv] = [0, 1, 2].map(|k| &sums[k * span..(k + 1) * span]);
-    let window =
-        |s: &[f32], i: usize| (s[i] + s[i + 1]) + (s[i + 2] + s[i + 3]) + (s[i + 4] + s[i + 5]) + s[i + 6];
-    let rows = &mut rows[..n];
-    for (i, strength) in best.iter_mut().enumerate() {
-        let (a, b, c) = (window(uu, i), window(uv, i), window(vv, i));
+    let span = best.len() + 2 * RADIUS;
+    let sums = [&sums[..span], &sums[span..2 * span], &sums[2 * span..3 * span]];
+    let (bests, rest) = best.as_chunks_mut::<LANES>();
+    let (blocks, rest_rows) = rows.as_chunks_mut::<LANES>();
+    let whole = bests.len() * LANES;
+    for (k, (best, rows)) in bests.iter_mut().zip(blocks).enumerate() {
+        keep_stronger(sums, k * LANES, row, best, rows);
+    }
+    for (k, (best, rows)) in rest.iter_mut().zip(rest_rows).enumerate() {
+        keep_stronger(sums, whole + k, row, std::array::from_mut(best), std::array::from_mut(rows));
+    }
+}
+}
+
+/// Columns handled at once.
+const LANES: usize = 16;
+
+#[inline(always)]
+fn keep_stronger<const N: usize>(
+    sums: [&[f32]; 3],
+    first: usize,
+    row: f32,
+    best: &mut [f32; N],
+    rows: &mut [f32; N],
+) {
+    let mut tensor = [[0.0_f32; N]; 3];
+    for (t, sums) in tensor.iter_mut().zip(sums) {
+        for k in 0..SIDE {
+            let shifted = &sums[first + k..first + k + N];
+            for i in 0..N {
+                t[i] += shifted[i];
+            }
+        }
+    }
+    for i in 0..N {
+        let (a, b, c) = (tensor[0][i], tensor[1][i], tensor[2][i]);
         let half_difference = 0.5 * (a - c);
         let smaller = 0.5 * (a + c) - (half_difference * half_difference + b * b).sqrt();
         let smaller = smaller / (SIDE * SIDE) as f32;
-        let better = smaller > *strength;
-        *strength = if better { smaller } else { *strength };
-        rows[i] = if better { row } else { rows[i] };
+        rows[i] = if smaller > best[i] { row } else { rows[i] };
+        best[i] = if smaller > best[i] { smaller } else { best[i] };
     }
-}
 }
 
 #[cfg(test)]

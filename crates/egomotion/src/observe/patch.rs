@@ -193,7 +193,7 @@ descend(
             inverse.m21 * pull.0 + inverse.m22 * pull.1,
         );
         (u, v) = (u + step.0, v + step.1);
-        if step.0.hypot(step.1) < settling.step_px {
+        if step.0 * step.0 + step.1 * step.1 < settling.step_px * settling.step_px {
             return Some(Located { u, v, residual: square / f64::from(AREA) });
         }
     }

@@ -106,14 +106,36 @@ filter_row(rows: &[&[f32]; 2 * TAPS + 1], taps: &[f32; TAPS + 1], line: &mut [f3
 /// Σ of lines with symmetric weights, the middle one's first.
 #[inline(always)]
 fn weighted_sum(lines: &[&[f32]; 2 * TAPS + 1], taps: &[f32; TAPS + 1], out: &mut [f32]) {
-    let lines = lines.map(|line| &line[..out.len()]);
-    for (x, out) in out.iter_mut().enumerate() {
-        let mut sum = taps[0] * lines[TAPS][x];
-        for k in 1..=TAPS {
-            sum += taps[k] * (lines[TAPS - k][x] + lines[TAPS + k][x]);
-        }
-        *out = sum;
+    const LANES: usize = 16;
+    let whole = out.len() / LANES * LANES;
+    let (blocks, rest) = out.as_chunks_mut::<LANES>();
+    for (k, block) in blocks.iter_mut().enumerate() {
+        *block = weighted_block(lines, taps, k * LANES);
     }
+    for (k, out) in rest.iter_mut().enumerate() {
+        [*out] = weighted_block(lines, taps, whole + k);
+    }
+}
+
+/// The same of N neighbouring values from `first` on.
+#[inline(always)]
+fn weighted_block<const N: usize>(
+    lines: &[&[f32]; 2 * TAPS + 1],
+    taps: &[f32; TAPS + 1],
+    first: usize,
+) -> [f32; N] {
+    let mut sum = [0.0; N];
+    let middle = &lines[TAPS][first..first + N];
+    for i in 0..N {
+        sum[i] = taps[0] * middle[i];
+    }
+    for k in 1..=TAPS {
+        let (before, after) = (&lines[TAPS - k][first..first + N], &lines[TAPS + k][first..first + N]);
+        for i in 0..N {
+            sum[i] += taps[k] * (before[i] + after[i]);
+        }
+    }
+    sum
 }
 
 /// An index beyond a line of `n`, mirrored about its first and last pixel as often as needed.
