@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::Result;
 use egomotion::geometry::{Grid, Image, RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::stereo::StageTimes;
-use egomotion::pipeline::{Config, FrameMotion, StereoFrame, StereoMotion, Trajectory, Unanswered};
+use egomotion::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion, Trajectory, Unanswered};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::feed::{Fetched, with_frames};
@@ -93,7 +93,9 @@ impl Session<'_> {
             for fetched in frames {
                 let Fetched { index, time_s, pair, truth, decode_ms } = fetched;
                 truths.push(truth);
-                let keep = pair.as_ref().ok().map(|(left, _)| left.clone());
+                // Pictures show the maps over the image that they belong to.
+                let dense = self.config.observe == Observe::Dense;
+                let keep = pair.as_ref().ok().filter(|_| dense).map(|(left, _)| left.clone());
                 let motion = match pair {
                     Ok((left, right)) => pipeline.push(StereoFrame { time_s, left, right }),
                     Err(why) => pipeline.skip(time_s, why),

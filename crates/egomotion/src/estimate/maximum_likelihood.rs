@@ -14,7 +14,7 @@ use super::alignment::{Form, Moments, PointPair};
 use super::blocks::{self, BlockScore, Blocks};
 use super::lmeds::{random_subsets, trials};
 use super::m_estimator::{LEAST_SCALE2, StudentT};
-use super::measurement::{At, Linearised, Measurement};
+use super::measurement::{At, Linearised, Measurement, product};
 use super::{Estimate, MotionEstimate, Observability, Unsolvable, median};
 use crate::geometry::{Gaussian, StereoRig, Twist};
 use crate::observe::StereoTrack;
@@ -63,15 +63,15 @@ struct Step {
 
 impl Step {
     fn add(&mut self, l: &Linearised, kernel: &StudentT, scale2: f64) {
-        let Some(inverse) = l.weight() else { return };
+        let inverse = l.inverse_cov;
         let q = l.misclosure.dot(&(inverse * l.misclosure));
         let weight = kernel.weight(q / scale2, 3.0);
-        let weighted = l.by_phi.transpose() * inverse;
-        let (information, score) = (weighted * l.by_phi, weighted * l.misclosure);
+        let weighted = product(&l.by_phi.transpose(), &inverse);
+        let (information, score) = (product(&weighted, &l.by_phi), product(&weighted, &l.misclosure));
         self.score.information += weight * information;
         self.score.score += weight * score;
-        self.bread +=
-            weight * information - kernel.curvature(q / scale2, 3.0) / scale2 * score * score.transpose();
+        self.bread += weight * information
+            - kernel.curvature(q / scale2, 3.0) / scale2 * product(&score, &score.transpose());
         self.weighted_square += weight * q;
         self.square += q;
         self.used += 1;
@@ -180,7 +180,7 @@ pub(super) fn robust_scale2<M: Measurement>(observations: &[M], phi: &Twist, rig
 /// q with the structure held at its measured value (the Sampson form).
 fn sampson<M: Measurement>(observation: &M, at: &At<'_>) -> Option<f64> {
     let l = observation.linearise(&mut observation.structure(), at)?;
-    Some(l.misclosure.dot(&(l.weight()? * l.misclosure)))
+    Some(l.misclosure.dot(&(l.inverse_cov * l.misclosure)))
 }
 
 fn finish<M: Measurement>(
@@ -244,10 +244,23 @@ pub fn robust_start(
         Some(alignment.motion()?.log())
     });
     let candidates: Vec<Twist> = candidates.chain(prior.copied()).collect();
-    let judged: Vec<f64> =
-        candidates.par_iter().map(|phi| robust_scale2(&sample, phi, rig).unwrap_or(f64::INFINITY)).collect();
-    let best = (0..candidates.len()).min_by(|&a, &b| judged[a].total_cmp(&judged[b]));
-    best.map(|k| candidates[k]).ok_or(Unsolvable::Unobservable)
+    let stride = (sample.len() / FIRST_LOOK).max(1);
+    let glance: Vec<StereoTrack> = sample.iter().step_by(stride).copied().collect();
+    let finalists = best(&candidates, FINALISTS, &glance, rig);
+    best(&finalists, 1, &sample, rig).first().copied().ok_or(Unsolvable::Unobservable)
+}
+
+/// Candidates are first judged on about so many observations,
+const FIRST_LOOK: usize = 100;
+/// and so many of them on all.
+const FINALISTS: usize = 12;
+
+/// The `count` candidates with the least median of q, the best first.
+fn best(candidates: &[Twist], count: usize, sample: &[StereoTrack], rig: &StereoRig) -> Vec<Twist> {
+    let judge = |phi: &Twist| (robust_scale2(sample, phi, rig).unwrap_or(f64::INFINITY), *phi);
+    let mut judged: Vec<(f64, Twist)> = candidates.par_iter().map(judge).collect();
+    judged.sort_by(|a, b| a.0.total_cmp(&b.0));
+    judged.into_iter().take(count).map(|(_, phi)| phi).collect()
 }
 
 /// The inverse Fisher information of φ at a known motion and structure: no unbiased estimator does better.

@@ -21,19 +21,44 @@ impl<'a> At<'a> {
     }
 }
 
-/// Misclosure e of an observation, its covariance S, and −∂e/∂φ.
+/// Misclosure e of an observation, the inverse of its covariance S, and −∂e/∂φ.
 #[derive(Debug, Clone, Copy)]
 pub struct Linearised {
     pub(super) misclosure: Vector3<f64>,
-    pub(super) cov: Matrix3<f64>,
+    pub(super) inverse_cov: Matrix3<f64>,
     pub(super) by_phi: SMatrix<f64, 3, 6>,
 }
 
-impl Linearised {
-    /// S⁻¹; `None` unless S is positive definite, which rounding or a careless caller may break.
-    pub(super) fn weight(&self) -> Option<Matrix3<f64>> {
-        self.cov.cholesky().map(|c| c.inverse())
+/// A B, in place of the library's product for matrices of any size, which costs twice as much for those as small as here.
+#[inline(always)]
+pub(super) fn product<const N: usize, const K: usize, const M: usize>(
+    a: &SMatrix<f64, N, K>,
+    b: &SMatrix<f64, K, M>,
+) -> SMatrix<f64, N, M> {
+    let mut out = [[0.0; N]; M];
+    // Stored by columns.
+    let (a, b) = (&a.data.0, &b.data.0);
+    for m in 0..M {
+        for k in 0..K {
+            for n in 0..N {
+                out[m][n] += a[k][n] * b[m][k];
+            }
+        }
     }
+    SMatrix::from_data(nalgebra::ArrayStorage(out))
+}
+
+/// S⁻¹ by cofactors; `None` unless S is positive definite, which rounding or a careless caller may break.
+fn inverse(s: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let [a, b, c] =
+        [s.m22 * s.m33 - s.m23 * s.m23, s.m13 * s.m23 - s.m12 * s.m33, s.m12 * s.m23 - s.m13 * s.m22];
+    let determinant = s.m11 * a + s.m12 * b + s.m13 * c;
+    let minor = s.m11 * s.m22 - s.m12 * s.m12;
+    if !(s.m11 > 0.0 && minor > 0.0 && determinant > 0.0 && determinant.is_finite()) {
+        return None;
+    }
+    let (d, e) = (s.m11 * s.m33 - s.m13 * s.m13, s.m12 * s.m13 - s.m11 * s.m23);
+    Some(Matrix3::new(a, b, c, b, d, e, c, e, minor) / determinant)
 }
 
 /// An observation that maximum likelihood can use.
@@ -75,20 +100,22 @@ impl Measurement for StereoTrack {
     fn linearise(&self, s: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised> {
         let moved = at.motion.apply(&at.rig.point(s)?);
         let by_moved = at.rig.project_jacobian(&moved);
-        let by_structure = by_moved * at.motion.rotation * at.rig.point_jacobian(s);
+        let by_structure = product(&product(&by_moved, &at.motion.rotation), &at.rig.point_jacobian(s));
         let predicted = at.rig.project(&moved)?;
         let misclosure = self.after.mean - predicted - by_structure * (self.before.mean - *s);
-        let gain = self.before.cov * by_structure.transpose();
-        let cov = self.after.cov + by_structure * gain;
-        let pull = cov.try_inverse()? * misclosure;
+        let gain = product(&self.before.cov, &by_structure.transpose());
+        let cov = self.after.cov + product(&by_structure, &gain);
+        let inverse_cov = inverse(&cov)?;
+        let pull = inverse_cov * misclosure;
         let shift = gain * pull;
         let improved = self.before.mean + shift * restraint(pull.dot(&(by_structure * shift)));
         // A first guess may be wild; a structure must stay in front of the camera.
         if improved.z > 0.1 * s.z {
             *s = improved;
         }
-        let by_phi = by_moved * RigidMotion::point_jacobian(&moved) * at.left_jacobian;
-        Some(Linearised { misclosure, cov, by_phi })
+        let by_motion = product(&by_moved, &RigidMotion::point_jacobian(&moved));
+        let by_phi = product(&by_motion, &at.left_jacobian);
+        Some(Linearised { misclosure, inverse_cov, by_phi })
     }
 
     fn displacement_px(&self) -> f64 {
@@ -145,12 +172,13 @@ impl Measurement for StereoFlow {
         );
         let gain: Vector3<f64> = pick * self.measured.cov * Vector4::x();
         let cov = pick * self.measured.cov * pick.transpose();
-        let shift = -gain.dot(&(cov.try_inverse()? * misclosure));
+        let inverse_cov = inverse(&cov)?;
+        let shift = -gain.dot(&(inverse_cov * misclosure));
         let improved = measured[0] + shift * restraint(shift * shift / self.measured.cov[(0, 0)]);
         if improved > 0.1 * d {
             s.z = improved;
         }
-        Some(Linearised { misclosure, cov, by_phi })
+        Some(Linearised { misclosure, inverse_cov, by_phi })
     }
 
     fn displacement_px(&self) -> f64 {

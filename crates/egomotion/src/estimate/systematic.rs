@@ -9,7 +9,7 @@ use nalgebra::{Matrix6, SMatrix, Vector6};
 use super::Observability;
 use super::m_estimator::StudentT;
 use super::maximum_likelihood::robust_scale2;
-use super::measurement::{At, Measurement};
+use super::measurement::{At, Measurement, product};
 use crate::geometry::{StereoRig, Twist};
 
 /// How φ̂ answers to errors common to all observations.
@@ -49,10 +49,10 @@ pub fn common_errors<M: Measurement>(
         let Some(l) = observation.linearise(&mut observation.structure(), &at) else { continue };
         let shifted = observation.with_disparity_offset(OFFSET_STEP_PX);
         let Some(s) = shifted.linearise(&mut shifted.structure(), &at) else { continue };
-        let Some(inverse) = l.weight() else { continue };
+        let inverse = l.inverse_cov;
         let weight = kernel.weight(l.misclosure.dot(&(inverse * l.misclosure)) / scale2, 3.0);
-        let weighted = weight * l.by_phi.transpose() * inverse;
-        information += weighted * l.by_phi;
+        let weighted = weight * product(&l.by_phi.transpose(), &inverse);
+        information += product(&weighted, &l.by_phi);
         let share = observation.displacement_px().min(1.0);
         let mut localisation = response.fixed_view_mut::<6, 3>(0, 0);
         localisation += share * weighted;

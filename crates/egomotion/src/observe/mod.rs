@@ -2,18 +2,24 @@
 
 pub mod corners;
 pub mod disparity;
+mod dispatch;
 pub mod flow;
+mod follow;
 pub mod observation;
 pub mod patch;
 pub mod pyramid;
 pub mod row_disagreement;
+mod row_search;
 pub mod sample;
 pub mod spline;
+pub mod stereo_pyramid;
 pub mod tracks;
+mod window;
 
 pub use disparity::{DisparityMap, DisparityMatcher, DisparityOptions};
 pub use flow::{FlowField, FlowOptions, dense_flow};
 pub use observation::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 pub use pyramid::Pyramid;
 pub use sample::DensePair;
-pub use tracks::{StereoPyramid, TrackOptions};
+pub use stereo_pyramid::StereoPyramid;
+pub use tracks::TrackOptions;

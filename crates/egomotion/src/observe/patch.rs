@@ -3,19 +3,16 @@
 //! Inverse-compositional Lucas–Kanade on images given as spline coefficients ([`super::spline`]).
 //! Both windows are reduced to zero mean and equal contrast, so that gain and offset between cameras or exposures do not matter.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Matrix2;
 
-use super::spline;
+use super::dispatch::vectorised;
+use super::window::{self, LANES, SIDE, Window};
 use crate::geometry::Image;
 
-/// Half the side of a window, in pixels.
-pub const RADIUS: usize = 5;
-/// Side of a window.
-const SIDE: usize = 2 * RADIUS + 1;
+pub use super::window::RADIUS;
+
 /// Number of pixels of a window.
-const AREA: usize = SIDE * SIDE;
-/// Side of a window with the margin that its gradient needs.
-const WIDE: usize = SIDE + 2;
+const AREA: f32 = (SIDE * SIDE) as f32;
 
 /// Along which directions a patch may move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,12 +23,21 @@ pub enum Freedom {
     Row,
 }
 
+/// When a localisation ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settling {
+    /// Most iterations.
+    pub iterations: usize,
+    /// A step shorter than this is the last, in pixels.
+    pub step_px: f64,
+}
+
 /// A window of an image, ready to be located elsewhere.
 #[derive(Debug, Clone)]
 pub struct Patch {
-    values: [f32; AREA],
-    du: [f32; AREA],
-    dv: [f32; AREA],
+    values: Window,
+    du: Window,
+    dv: Window,
     /// Σ ∇I ∇Iᵀ over the window.
     tensor: Matrix2<f64>,
     contrast: f32,
@@ -51,23 +57,44 @@ pub struct Located {
 impl Patch {
     /// The window of an image (as spline coefficients) around (u, v), in pixels; `None` near the border or without any contrast.
     pub fn new(image: &Image, u: f64, v: f64) -> Option<Self> {
-        let mut wide = [0.0; WIDE * WIDE];
-        sample_window::<WIDE>(image, u, v, 1.0, &mut wide)?;
-        let (mut values, mut du, mut dv) = ([0.0; AREA], [0.0; AREA], [0.0; AREA]);
+        plain_patch(image, u, v)
+    }
+
+    /// The same of the image magnified by `scale` around (u, v): what another image that shows the
+    /// surface so much larger is compared with.
+    pub fn magnified(image: &Image, u: f64, v: f64, scale: f64) -> Option<Self> {
+        spaced_patch(image, u, v, scale.recip())
+    }
+
+    /// From the window with the margin of a pixel that its gradient needs.
+    #[inline(always)]
+    fn from_wide(wide: &[[f32; LANES]; SIDE + 2]) -> Option<Self> {
+        let mut patch = Self {
+            values: [[0.0; LANES]; SIDE],
+            du: [[0.0; LANES]; SIDE],
+            dv: [[0.0; LANES]; SIDE],
+            tensor: Matrix2::zeros(),
+            contrast: 0.0,
+        };
+        let (mut uu, mut uv, mut vv) = ([0.0_f32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
         for row in 0..SIDE {
-            for column in 0..SIDE {
-                let (i, w) = (row * SIDE + column, (row + 1) * WIDE + column + 1);
-                values[i] = wide[w];
-                du[i] = 0.5 * (wide[w + 1] - wide[w - 1]);
-                dv[i] = 0.5 * (wide[w + WIDE] - wide[w - WIDE]);
+            let (above, here, below) = (&wide[row], &wide[row + 1], &wide[row + 2]);
+            for i in 0..SIDE {
+                patch.values[row][i] = here[i + 1];
+                patch.du[row][i] = 0.5 * (here[i + 2] - here[i]);
+                patch.dv[row][i] = 0.5 * (below[i + 1] - above[i + 1]);
+            }
+            let (du, dv) = (&patch.du[row], &patch.dv[row]);
+            for i in 0..LANES {
+                uu[i] += du[i] * du[i];
+                uv[i] += du[i] * dv[i];
+                vv[i] += dv[i] * dv[i];
             }
         }
-        let contrast = standardise(&mut values)?;
-        let dot =
-            |a: &[f32; AREA], b: &[f32; AREA]| f64::from(a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>());
-        let cross = dot(&du, &dv);
-        let tensor = Matrix2::new(dot(&du, &du), cross, cross, dot(&dv, &dv));
-        Some(Self { values, du, dv, tensor, contrast })
+        patch.contrast = standardise(&mut patch.values)?;
+        let cross = total(&uv);
+        patch.tensor = Matrix2::new(total(&uu), cross, cross, total(&vv));
+        Some(patch)
     }
 
     /// Covariance of the window's place per unit variance of a grey level, free in the plane; `None` for an edge.
@@ -85,17 +112,22 @@ impl Patch {
         f64::from(self.contrast)
     }
 
+    /// Smaller eigenvalue of the mean of ∇I ∇Iᵀ, in (grey levels per pixel)².
+    pub fn strength(&self) -> f64 {
+        let t = &self.tensor;
+        let half = 0.5 * (t[(0, 0)] - t[(1, 1)]);
+        (0.5 * t.trace() - half.hypot(t[(0, 1)])) / f64::from(AREA)
+    }
+
     /// Find the window in `image` (as spline coefficients) from a start (u, v), in pixels.
     ///
-    /// `scale` is the expected magnification there. `None` if it leaves the image, has no contrast
-    /// there, is not locatable, or has not settled after `iterations`.
+    /// `None` if it leaves the image, has no contrast there, is not locatable, or has not settled.
     pub fn locate(
         &self,
         image: &Image,
-        (mut u, mut v): (f64, f64),
-        scale: f64,
+        start: (f64, f64),
         freedom: Freedom,
-        iterations: usize,
+        settling: Settling,
     ) -> Option<Located> {
         let inverse = match freedom {
             Freedom::Plane => self.covariance_shape()?,
@@ -104,81 +136,109 @@ impl Patch {
         if !inverse.iter().all(|x| x.is_finite()) {
             return None;
         }
-        let mut window = [0.0; AREA];
-        for _ in 0..iterations {
-            sample_window::<SIDE>(image, u, v, scale, &mut window)?;
-            let contrast = standardise(&mut window)?;
-            // Contrasts may differ between cameras, but not by this much if it is the same surface.
-            let gain = self.contrast / contrast;
-            if !(0.33..3.0).contains(&gain) {
-                return None;
-            }
-            let (mut pull_u, mut pull_v, mut sum) = (0.0_f32, 0.0_f32, 0.0_f32);
-            for (((&value, &there), &du), &dv) in self.values.iter().zip(&window).zip(&self.du).zip(&self.dv)
-            {
-                let difference = value - gain * there;
-                pull_u += du * difference;
-                pull_v += dv * difference;
-                sum += difference * difference;
-            }
-            let step = inverse * Vector2::new(f64::from(pull_u), f64::from(pull_v)) * scale;
-            (u, v) = (u + step.x, v + step.y);
-            if step.norm() < 0.01 {
-                return Some(Located { u, v, residual: f64::from(sum) / AREA as f64 });
+        descend(self, image, start, &inverse, settling)
+    }
+
+    /// Σ ∇I ΔI and Σ ΔI² of the difference ΔI from another window of which the contrast is multiplied by `gain`.
+    #[inline(always)]
+    fn pull(&self, there: &Window, gain: f32) -> ((f64, f64), f64) {
+        let (mut u, mut v, mut square) = ([0.0_f32; LANES], [0.0_f32; LANES], [0.0_f32; LANES]);
+        for row in 0..SIDE {
+            let (value, there) = (&self.values[row], &there[row]);
+            let (du, dv) = (&self.du[row], &self.dv[row]);
+            for i in 0..LANES {
+                let difference = value[i] - gain * there[i];
+                u[i] += du[i] * difference;
+                v[i] += dv[i] * difference;
+                square[i] += difference * difference;
             }
         }
-        None
+        ((total(&u), total(&v)), total(&square))
     }
+}
+
+vectorised! {
+plain_patch(image: &Image, u: f64, v: f64) -> Option<Patch> {
+    Patch::from_wide(&window::sample(image, u, v)?)
+}
+}
+
+vectorised! {
+spaced_patch(image: &Image, u: f64, v: f64, spacing: f64) -> Option<Patch> {
+    Patch::from_wide(&window::sample_spaced(image, u, v, spacing)?)
+}
+}
+
+vectorised! {
+/// Gauss–Newton from a start, with the inverse of the patch's tensor.
+descend(
+    patch: &Patch,
+    image: &Image,
+    start: (f64, f64),
+    inverse: &Matrix2<f64>,
+    settling: Settling,
+) -> Option<Located> {
+    let (mut u, mut v) = start;
+    for _ in 0..settling.iterations {
+        let mut there: Window = window::sample(image, u, v)?;
+        let contrast = standardise(&mut there)?;
+        // Contrasts may differ between cameras, but not by this much if it is the same surface.
+        let gain = patch.contrast / contrast;
+        if !(0.33..3.0).contains(&gain) {
+            return None;
+        }
+        let (pull, square) = patch.pull(&there, gain);
+        let step = (
+            inverse.m11 * pull.0 + inverse.m12 * pull.1,
+            inverse.m21 * pull.0 + inverse.m22 * pull.1,
+        );
+        (u, v) = (u + step.0, v + step.1);
+        if step.0 * step.0 + step.1 * step.1 < settling.step_px * settling.step_px {
+            return Some(Located { u, v, residual: square / f64::from(AREA) });
+        }
+    }
+    None
+}
+}
+
+/// Sum over the lanes that belong to the window.
+#[inline(always)]
+fn total(lanes: &[f32; LANES]) -> f64 {
+    let mut sum = 0.0;
+    for lane in &lanes[..SIDE] {
+        sum += lane;
+    }
+    f64::from(sum)
 }
 
 /// Reduce to zero mean; the standard deviation, or `None` if it vanishes.
-fn standardise(values: &mut [f32; AREA]) -> Option<f32> {
-    let mean = values.iter().sum::<f32>() / AREA as f32;
-    let mut square = 0.0;
-    for value in values.iter_mut() {
-        *value -= mean;
-        square += *value * *value;
+#[inline(always)]
+fn standardise(values: &mut Window) -> Option<f32> {
+    let mut sum = [0.0_f32; LANES];
+    for row in values.iter() {
+        for i in 0..LANES {
+            sum[i] += row[i];
+        }
     }
-    let deviation = (square / AREA as f32).sqrt();
+    let mean = total(&sum) as f32 / AREA;
+    let mut square = [0.0_f32; LANES];
+    for row in values.iter_mut() {
+        for i in 0..LANES {
+            row[i] -= mean;
+            square[i] += row[i] * row[i];
+        }
+    }
+    let deviation = (total(&square) as f32 / AREA).sqrt();
     (deviation > 0.1 && deviation.is_finite()).then_some(deviation)
-}
-
-/// Sample an N×N window of spacing `scale` around (u, v); `None` unless it lies inside with a margin.
-fn sample_window<const N: usize>(image: &Image, u: f64, v: f64, scale: f64, out: &mut [f32]) -> Option<()> {
-    let half = (N / 2) as f64 * scale;
-    let (width, height) = image.size();
-    let inside = |c: f64, n: usize| c - half >= 1.0 && c + half < n as f64 - 2.0;
-    if !(inside(u, width) && inside(v, height)) {
-        return None;
-    }
-    let place = |c: f64, k: usize| {
-        let at = c - half + k as f64 * scale;
-        (at as usize - 1, spline::weights((at - at.floor()) as f32))
-    };
-    let columns: [(usize, [f32; 4]); N] = std::array::from_fn(|k| place(u, k));
-    let first = columns[0].0;
-    let span = columns[N - 1].0 + 4 - first;
-    // Magnifications of up to about 4 fit; a patch that grows more is not followed.
-    let mut line = [0.0_f32; 64];
-    let line = line.get_mut(..span)?;
-    for (row, out) in out.chunks_exact_mut(N).enumerate() {
-        let (top, w) = place(v, row);
-        let source: [&[f32]; 4] = std::array::from_fn(|k| &image.row(top + k)[first..first + span]);
-        for (i, value) in line.iter_mut().enumerate() {
-            *value = w[0] * source[0][i] + w[1] * source[1][i] + w[2] * source[2][i] + w[3] * source[3][i];
-        }
-        for (value, (at, w)) in out.iter_mut().zip(&columns) {
-            let s = &line[at - first..at - first + 4];
-            *value = w[0] * s[0] + w[1] * s[1] + w[2] * s[2] + w[3] * s[3];
-        }
-    }
-    Some(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::geometry::Grid;
+    use crate::observe::spline;
+
+    const SETTLING: Settling = Settling { iterations: 30, step_px: 0.01 };
 
     fn texture(u: f64, v: f64) -> f32 {
         (100.0
@@ -197,11 +257,12 @@ mod tests {
     fn a_shift_is_found_to_a_hundredth_of_a_pixel() {
         let patch = Patch::new(&image((0.0, 0.0), 1.0, 0.0), 40.0, 41.0).unwrap();
         for shift in [(0.3, -0.4), (1.7, 1.2), (-0.5, 0.0)] {
-            let found = patch.locate(&image(shift, 1.1, 7.0), (40.0, 41.0), 1.0, Freedom::Plane, 20).unwrap();
+            let found =
+                patch.locate(&image(shift, 1.1, 7.0), (40.0, 41.0), Freedom::Plane, SETTLING).unwrap();
             assert!((found.u - 40.0 - shift.0).abs() < 0.01, "{found:?} {shift:?}");
             assert!((found.v - 41.0 - shift.1).abs() < 0.01, "{found:?} {shift:?}");
         }
-        let along = patch.locate(&image((1.4, 0.0), 1.0, 0.0), (40.0, 41.0), 1.0, Freedom::Row, 20).unwrap();
+        let along = patch.locate(&image((1.4, 0.0), 1.0, 0.0), (40.0, 41.0), Freedom::Row, SETTLING).unwrap();
         assert!((along.u - 41.4).abs() < 0.01 && along.v == 41.0, "{along:?}");
     }
 
@@ -210,8 +271,8 @@ mod tests {
         let zoomed = spline::coefficients(&Grid::from_fn(96, 80, |u, v| {
             texture(40.0 + (u as f64 - 43.0) / 1.1, 41.0 + (v as f64 - 40.0) / 1.1)
         }));
-        let patch = Patch::new(&image((0.0, 0.0), 1.0, 0.0), 40.0, 41.0).unwrap();
-        let found = patch.locate(&zoomed, (42.0, 41.0), 1.1, Freedom::Plane, 20).unwrap();
+        let patch = Patch::magnified(&image((0.0, 0.0), 1.0, 0.0), 40.0, 41.0, 1.1).unwrap();
+        let found = patch.locate(&zoomed, (42.0, 41.0), Freedom::Plane, SETTLING).unwrap();
         assert!((found.u - 43.0).abs() < 0.02 && (found.v - 40.0).abs() < 0.02, "{found:?}");
     }
 
@@ -222,8 +283,8 @@ mod tests {
         assert!(Patch::new(&image, f64::NAN, 40.0).is_none());
         assert!(Patch::new(&Grid::filled(64, 64, 9.0), 30.0, 30.0).is_none());
         let patch = Patch::new(&image, 40.0, 40.0).unwrap();
-        assert!(patch.locate(&image, (2.0, 40.0), 1.0, Freedom::Plane, 20).is_none());
-        assert!(patch.locate(&Grid::filled(96, 80, 1.0), (40.0, 40.0), 1.0, Freedom::Row, 20).is_none());
+        assert!(patch.locate(&image, (2.0, 40.0), Freedom::Plane, SETTLING).is_none());
+        assert!(patch.locate(&Grid::filled(96, 80, 1.0), (40.0, 40.0), Freedom::Row, SETTLING).is_none());
     }
 
     #[test]
@@ -243,7 +304,7 @@ mod tests {
                 spline::coefficients(&out)
             };
             let patch = Patch::new(&noisy(&clean), 40.0, 41.0).unwrap();
-            let found = patch.locate(&noisy(&shifted), (40.0, 41.0), 1.0, Freedom::Plane, 30).unwrap();
+            let found = patch.locate(&noisy(&shifted), (40.0, 41.0), Freedom::Plane, SETTLING).unwrap();
             // Both windows carry noise, so the difference has twice the variance of one place.
             let shape = patch.covariance_shape().unwrap() * (2.0 * 4.0);
             squares[0] += (found.u - 40.37).powi(2) / shape[(0, 0)] / f64::from(n);

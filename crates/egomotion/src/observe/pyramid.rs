@@ -1,5 +1,6 @@
 //! Image pyramid and image gradients, computed once per frame and shared by flow and tracks.
 
+use super::dispatch::vectorised;
 use crate::geometry::{Grid, Image};
 use rayon::prelude::*;
 
@@ -21,15 +22,37 @@ impl Pyramid {
     /// Each level is the one before, smoothed by the 5-tap binomial (1 4 6 4 1)/16 in both directions
     /// (border pixels repeated) and decimated by 2.
     pub fn new(image: Image, max_levels: usize) -> Self {
-        let mut levels = vec![image];
-        while levels.len() < max_levels {
-            let Some(next) = levels.last().map(halve) else { break };
-            if next.width().min(next.height()) < MIN_SIDE {
+        let mut pyramid = Self { levels: vec![image] };
+        pyramid.build(max_levels);
+        pyramid
+    }
+
+    /// The pyramid of [`smooth`]ed `image` in place of this one, whose memory is used again.
+    pub fn renew(&mut self, image: &Image, max_levels: usize) {
+        if self.levels.is_empty() {
+            self.levels.push(Grid::filled(0, 0, 0.0));
+        }
+        smooth_into(image, &mut self.levels[0]);
+        self.build(max_levels);
+    }
+
+    /// All levels above the first.
+    fn build(&mut self, max_levels: usize) {
+        let (mut width, mut height) = self.size();
+        let mut count = 1;
+        while count < max_levels {
+            (width, height) = (width.div_ceil(2), height.div_ceil(2));
+            if width.min(height) < MIN_SIDE {
                 break;
             }
-            levels.push(next);
+            if self.levels.len() == count {
+                self.levels.push(Grid::filled(0, 0, 0.0));
+            }
+            let (finer, coarser) = self.levels.split_at_mut(count);
+            halve_into(&finer[count - 1], &mut coarser[0]);
+            count += 1;
         }
-        Self { levels }
+        self.levels.truncate(count);
     }
 
     /// All levels, the image itself first.
@@ -43,53 +66,98 @@ impl Pyramid {
     }
 }
 
+/// Rows handled by one task; fixed, and large enough to be worth one.
+const STRIP: usize = 32;
+
+/// Compute every row of `out`, which gets the given size, from its index; `scratch` makes a buffer per task.
+pub(super) fn fill_rows<S>(
+    out: &mut Image,
+    (width, height): (usize, usize),
+    scratch: impl Fn() -> S + Sync,
+    row: impl Fn(&mut S, usize, &mut [f32]) + Sync,
+) {
+    if out.size() != (width, height) {
+        *out = Grid::filled(width, height, 0.0);
+    }
+    out.values_mut().par_chunks_mut(width.max(1) * STRIP).enumerate().for_each(|(strip, rows)| {
+        let mut scratch = scratch();
+        for (k, out) in rows.chunks_exact_mut(width.max(1)).enumerate() {
+            row(&mut scratch, strip * STRIP + k, out);
+        }
+    });
+}
+
 /// The image smoothed by the binomial (1 2 1)/4 in both directions, border pixels repeated.
 ///
 /// Sub-pixel interpolation is only as good as the image is smooth: without this a displacement of a
 /// fraction of a pixel comes out several per cent too large or too small on fine texture.
 pub fn smooth(image: &Image) -> Image {
-    let (width, height) = image.size();
-    let mut out = Grid::filled(width, height, 0.0_f32);
-    out.values_mut().par_chunks_mut(width.max(1)).enumerate().for_each_init(
-        || vec![0.0_f32; width + 2],
-        |line, (y, out)| {
-            let (above, here, below) =
-                (image.row(y.saturating_sub(1)), image.row(y), image.row((y + 1).min(height - 1)));
-            for (x, s) in line[1..=width].iter_mut().enumerate() {
-                *s = 0.25 * (above[x] + below[x]) + 0.5 * here[x];
-            }
-            (line[0], line[width + 1]) = (line[1], line[width]);
-            for (x, o) in out.iter_mut().enumerate() {
-                *o = 0.25 * (line[x] + line[x + 2]) + 0.5 * line[x + 1];
-            }
-        },
-    );
+    let mut out = Grid::filled(0, 0, 0.0);
+    smooth_into(image, &mut out);
     out
 }
 
-/// Smooth by the binomial (1 4 6 4 1)/16 and keep every second pixel.
-fn halve(image: &Image) -> Image {
+fn smooth_into(image: &Image, out: &mut Image) {
     let (width, height) = image.size();
-    let mut half = Grid::filled(width.div_ceil(2), height.div_ceil(2), 0.0_f32);
-    let half_width = half.width().max(1);
-    half.values_mut().par_chunks_mut(half_width).enumerate().for_each_init(
-        || vec![0.0_f32; width + 4],
-        |smooth, (y, out)| {
-            let row = |dy: usize| image.row((2 * y + dy).saturating_sub(2).min(height - 1));
-            let rows = [row(0), row(1), row(2), row(3), row(4)];
-            for (x, s) in smooth[2..width + 2].iter_mut().enumerate() {
-                *s = (rows[0][x] + rows[4][x] + 4.0 * (rows[1][x] + rows[3][x]) + 6.0 * rows[2][x]) / 16.0;
-            }
-            let (first, last) = (smooth[2], smooth[width + 1]);
-            smooth[..2].fill(first);
-            smooth[width + 2..].fill(last);
-            for (x, o) in out.iter_mut().enumerate() {
-                let s = &smooth[2 * x..2 * x + 5];
-                *o = (s[0] + s[4] + 4.0 * (s[1] + s[3]) + 6.0 * s[2]) / 16.0;
-            }
+    fill_rows(
+        out,
+        (width, height),
+        || vec![0.0_f32; width + 2],
+        |line, y, out| {
+            let rows = [image.row(y.saturating_sub(1)), image.row(y), image.row((y + 1).min(height - 1))];
+            smooth_row(rows, line, out);
         },
     );
-    half
+}
+
+vectorised! {
+smooth_row(rows: [&[f32]; 3], line: &mut [f32], out: &mut [f32]) {
+    let [above, here, below] = rows;
+    let width = out.len();
+    for (((s, &a), &h), &b) in line[1..=width].iter_mut().zip(above).zip(here).zip(below) {
+        *s = 0.25 * (a + b) + 0.5 * h;
+    }
+    (line[0], line[width + 1]) = (line[1], line[width]);
+    let (left, right) = (&line[..width], &line[2..width + 2]);
+    for (((o, &l), &c), &r) in out.iter_mut().zip(left).zip(&line[1..=width]).zip(right) {
+        *o = 0.25 * (l + r) + 0.5 * c;
+    }
+}
+}
+
+/// Smooth by the binomial (1 4 6 4 1)/16 and keep every second pixel.
+fn halve_into(image: &Image, half: &mut Image) {
+    let (width, height) = image.size();
+    fill_rows(
+        half,
+        (width.div_ceil(2), height.div_ceil(2)),
+        || vec![0.0_f32; width + 5],
+        |line, y, out| {
+            let row = |dy: usize| image.row((2 * y + dy).saturating_sub(2).min(height - 1));
+            let rows = [row(0), row(1), row(2), row(3), row(4)];
+            halve_row(rows, line, out);
+        },
+    );
+}
+
+vectorised! {
+halve_row(rows: [&[f32]; 5], line: &mut [f32], out: &mut [f32]) {
+    let width = rows[0].len();
+    let rows = rows.map(|row| &row[..width]);
+    for (x, s) in line[2..width + 2].iter_mut().enumerate() {
+        *s = (rows[0][x] + rows[4][x] + 4.0 * (rows[1][x] + rows[3][x]) + 6.0 * rows[2][x]) / 16.0;
+    }
+    let (first, last) = (line[2], line[width + 1]);
+    line[..2].fill(first);
+    line[width + 2..].fill(last);
+    // Pairs of even and odd pixels, so that whole vectors are read.
+    let (pairs, _) = line.as_chunks::<2>();
+    let n = out.len();
+    let (a, b, c) = (&pairs[..n], &pairs[1..n + 1], &pairs[2..n + 2]);
+    for (((o, a), b), c) in out.iter_mut().zip(a).zip(b).zip(c) {
+        *o = (a[0] + c[0] + 4.0 * (a[1] + b[1]) + 6.0 * b[0]) / 16.0;
+    }
+}
 }
 
 /// Derivatives of an image.

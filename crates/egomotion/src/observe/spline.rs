@@ -7,6 +7,8 @@
 
 use rayon::prelude::*;
 
+use super::dispatch::vectorised;
+use super::pyramid::fill_rows;
 use crate::geometry::{Grid, Image};
 
 /// The pole of the cubic B-spline's inverse filter, √3 − 2.
@@ -17,6 +19,7 @@ const STRIP: usize = 64;
 const REACH: usize = 12;
 
 /// Weights of the four coefficients around the fraction `t` (0 … 1) of a pixel.
+#[inline(always)]
 pub fn weights(t: f32) -> [f32; 4] {
     let (s, t2) = (1.0 - t, t * t);
     let (a, d) = (s * s * s / 6.0, t2 * t / 6.0);
@@ -53,6 +56,93 @@ pub fn coefficients(image: &Image) -> Image {
         }
     }
     out
+}
+
+/// Reach of the filter that smooths and inverts at once, in pixels: beyond it lie 2·10⁻⁴ of the weight.
+const TAPS: usize = 6;
+
+/// Coefficients in both directions of the image smoothed by (1 2 1)/4 in both directions, in `out`,
+/// whose memory is used again; mirrored at the borders.
+///
+/// The two filters multiply to ³⁄₂ (1 + cos ω)/(2 + cos ω), whose impulse response
+/// ³⁄₂ (δₖ − z^|k|/√3), z = √3 − 2, falls off so fast that it is cheaper summed than run as a recursion.
+pub fn smoothed_coefficients(image: &Image, out: &mut Image) {
+    let (width, height) = image.size();
+    let mut taps = [0.0_f32; TAPS + 1];
+    let mut power = -1.5 / 3.0_f32.sqrt();
+    for tap in &mut taps {
+        *tap = power;
+        power *= POLE;
+    }
+    taps[0] += 1.5;
+    // What was cut off goes to the middle: a constant image stays what it is.
+    taps[0] += 1.0 - taps[0] - 2.0 * taps[1..].iter().sum::<f32>();
+    fill_rows(
+        out,
+        (width, height),
+        || vec![0.0_f32; width + 2 * TAPS],
+        |line, v, out| {
+            let row = |k: usize| image.row(reflected(v as isize + k as isize - TAPS as isize, height));
+            let rows: [&[f32]; 2 * TAPS + 1] = std::array::from_fn(row);
+            filter_row(&rows, &taps, line, out);
+        },
+    );
+}
+
+vectorised! {
+/// Down the columns, then along the row.
+filter_row(rows: &[&[f32]; 2 * TAPS + 1], taps: &[f32; TAPS + 1], line: &mut [f32], out: &mut [f32]) {
+    let width = out.len();
+    weighted_sum(rows, taps, &mut line[TAPS..TAPS + width]);
+    for k in 1..=TAPS {
+        line[TAPS - k] = line[TAPS + reflected(-(k as isize), width)];
+        line[TAPS + width - 1 + k] = line[TAPS + reflected((width - 1 + k) as isize, width)];
+    }
+    let shifted: [&[f32]; 2 * TAPS + 1] = std::array::from_fn(|k| &line[k..k + width]);
+    weighted_sum(&shifted, taps, out);
+}
+}
+
+/// Σ of lines with symmetric weights, the middle one's first.
+#[inline(always)]
+fn weighted_sum(lines: &[&[f32]; 2 * TAPS + 1], taps: &[f32; TAPS + 1], out: &mut [f32]) {
+    const LANES: usize = 16;
+    let whole = out.len() / LANES * LANES;
+    let (blocks, rest) = out.as_chunks_mut::<LANES>();
+    for (k, block) in blocks.iter_mut().enumerate() {
+        *block = weighted_block(lines, taps, k * LANES);
+    }
+    for (k, out) in rest.iter_mut().enumerate() {
+        [*out] = weighted_block(lines, taps, whole + k);
+    }
+}
+
+/// The same of N neighbouring values from `first` on.
+#[inline(always)]
+fn weighted_block<const N: usize>(
+    lines: &[&[f32]; 2 * TAPS + 1],
+    taps: &[f32; TAPS + 1],
+    first: usize,
+) -> [f32; N] {
+    let mut sum = [0.0; N];
+    let middle = &lines[TAPS][first..first + N];
+    for i in 0..N {
+        sum[i] = taps[0] * middle[i];
+    }
+    for k in 1..=TAPS {
+        let (before, after) = (&lines[TAPS - k][first..first + N], &lines[TAPS + k][first..first + N]);
+        for i in 0..N {
+            sum[i] += taps[k] * (before[i] + after[i]);
+        }
+    }
+    sum
+}
+
+/// An index beyond a line of `n`, mirrored about its first and last pixel as often as needed.
+fn reflected(index: isize, n: usize) -> usize {
+    let period = (2 * n).saturating_sub(2).max(1);
+    let index = index.rem_euclid(period as isize) as usize;
+    index.min(period - index).min(n - 1)
 }
 
 /// The inverse filter along one line.
@@ -158,9 +248,29 @@ mod tests {
     }
 
     #[test]
+    fn smoothing_and_inverting_at_once_is_the_same_as_one_after_the_other() {
+        use crate::observe::pyramid::smooth;
+        let image = Grid::from_fn(70, 50, |u, v| ((u * 37 + v * 91 + u * u * v) % 250) as f32);
+        let expected = coefficients(&smooth(&image));
+        let mut both = Grid::filled(0, 0, 0.0);
+        smoothed_coefficients(&image, &mut both);
+        for v in 8..42 {
+            for u in 8..62 {
+                let error = (both.at(u, v) - expected.at(u, v)).abs();
+                assert!(error < 0.05, "{u} {v}: {} {}", both.at(u, v), expected.at(u, v));
+            }
+        }
+        smoothed_coefficients(&Grid::filled(9, 7, 50.0), &mut both);
+        assert!(both.values().iter().all(|c| (c - 50.0).abs() < 1e-3));
+    }
+
+    #[test]
     fn the_smallest_images_are_no_trouble() {
         for (width, height) in [(0, 0), (1, 1), (2, 1), (1, 5), (3, 2)] {
             let c = coefficients(&Grid::filled(width, height, 7.0));
+            let mut smoothed = Grid::filled(0, 0, 0.0);
+            smoothed_coefficients(&Grid::filled(width, height, 7.0), &mut smoothed);
+            assert!(smoothed.size() == (width, height) && smoothed.values().iter().all(|c| c.is_finite()));
             if width > 0 {
                 let centre = sample(&c, (width - 1) as f32 / 2.0, (height - 1) as f32 / 2.0).unwrap();
                 assert!(centre.is_finite());

@@ -14,7 +14,7 @@ use crate::motion::TimeToImpact;
 use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
 use crate::motion::impact::nearest;
 use crate::observe::row_disagreement::row_disagreement;
-use crate::observe::tracks::{Hints, stereo_tracks};
+use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};
 use crate::observe::{DensePair, DisparityMap, FlowField, Pyramid, StereoPyramid, StereoTrack, dense_flow};
 
 /// Standard deviation of an offset of disparity per pixel by which rows disagree.
@@ -31,6 +31,8 @@ pub(super) struct Reference {
     pub(super) time_s: f64,
     pub(super) images: StereoPyramid,
     pub(super) disparity: Option<DisparityMap>,
+    /// Corners that were followed here from the frame before.
+    pub(super) corners: Vec<StereoCorner>,
 }
 
 /// Two frames to be compared.
@@ -48,7 +50,21 @@ pub(super) struct PairResult {
     pub(super) impact: Option<TimeToImpact>,
     pub(super) flow: Option<FlowField>,
     pub(super) maps: Option<MotionMaps>,
+    /// The corners that were followed, in the later frame.
+    pub(super) corners: Vec<StereoCorner>,
 }
+
+/// What following corners gave.
+struct Tracked {
+    tracks: Vec<StereoTrack>,
+    rough: Result<Twist, Unsolvable>,
+    corners: Vec<StereoCorner>,
+}
+
+/// About so many corners find the motion that guides the others.
+const SCOUTS: usize = 250;
+/// The level from which scouts are searched around their predicted place: a window there spans 44 pixels.
+const PRIOR_LEVEL: usize = 2;
 
 impl FramePair<'_> {
     pub(super) fn dt_s(&self) -> f64 {
@@ -58,38 +74,56 @@ impl FramePair<'_> {
     /// Observe, constrain and estimate; then what the motion means for every pixel.
     pub(super) fn motion(&self, velocity: Option<&Twist>, stages: &mut StageTimes) -> PairResult {
         let prior = velocity.map(|v| v.scaled(self.dt_s()));
-        let (tracks, rough) = timed(&mut stages.tracks_ms, || self.tracks(prior.as_ref()));
-        match self.config.observe {
+        let Tracked { tracks, rough, corners } = timed(&mut stages.tracks_ms, || self.tracks(prior.as_ref()));
+        let result = match self.config.observe {
             Observe::Sparse => self.sparse(&tracks, rough, stages),
-            Observe::Dense => self.dense(&tracks, rough, stages),
+            Observe::Dense => {
+                let refined =
+                    timed(&mut stages.tracks_ms, || rough.and_then(|rough| self.refined(&tracks, &rough)));
+                self.dense(&tracks, refined, stages)
+            }
+        };
+        PairResult { corners, ..result }
+    }
+
+    /// The corners of both frames: a few scouts find the motion that guides all of them.
+    fn tracks(&self, prior: Option<&Twist>) -> Tracked {
+        let images = &self.before.images;
+        let kept = &self.before.corners;
+        let corners = stereo_corners(images, kept, self.rig, self.hints(None), &self.config.tracks);
+        let step = corners.len().div_ceil(SCOUTS).max(1);
+        let scouts: Vec<StereoCorner> = corners.iter().step_by(step).copied().collect();
+        let mut found = match prior {
+            Some(_) => self.follow(&scouts, prior, Expected::FromLevel(PRIOR_LEVEL)),
+            None => Vec::new(),
+        };
+        // A wrong prior loses most corners; then searching without it finds more.
+        if 2 * found.len() < scouts.len() {
+            let free = self.follow(&scouts, None, Expected::FromLevel(usize::MAX));
+            if free.len() > found.len() {
+                found = free;
+            }
+        }
+        let rough = self.rough(&measured(&found, self.rig), prior);
+        let traces = match &rough {
+            Ok(rough) => self.follow(&corners, Some(rough), Expected::Near),
+            Err(_) => Vec::new(),
+        };
+        Tracked {
+            tracks: measured(&traces, self.rig),
+            rough,
+            corners: traces.iter().map(|trace| trace.after).collect(),
         }
     }
 
-    /// Corner tracks, twice: the first pass finds the motion that guides the second.
-    fn tracks(&self, prior: Option<&Twist>) -> (Vec<StereoTrack>, Result<Twist, Unsolvable>) {
-        let mut first = self.track(prior);
-        // A wrong prior leaves few tracks; then searching without it finds more.
-        if prior.is_some() && first.len() < self.config.tracks.corners / 4 {
-            let free = self.track(None);
-            if free.len() > first.len() {
-                first = free;
-            }
-        }
-        let first = self.rough(&first, prior);
-        match first {
-            Ok(rough) => {
-                let tracks = self.track(Some(&rough));
-                let refined = self.rough(&tracks, Some(&rough));
-                (tracks, refined)
-            }
-            Err(why) => (Vec::new(), Err(why)),
-        }
+    fn follow(&self, corners: &[StereoCorner], motion: Option<&Twist>, expected: Expected) -> Vec<Trace> {
+        let images = (&self.before.images, &self.after.images);
+        follow(images.0, images.1, corners, self.rig, self.hints(motion), expected, &self.config.tracks)
     }
 
-    fn track(&self, motion: Option<&Twist>) -> Vec<StereoTrack> {
+    fn hints<'b>(&'b self, motion: Option<&'b Twist>) -> Hints<'b> {
         let shift = self.before.disparity.as_ref().map(|d| &d.shift);
-        let hints = Hints { shift, motion, mask: self.mask };
-        stereo_tracks(&self.before.images, &self.after.images, self.rig, hints, &self.config.tracks)
+        Hints { shift, motion, mask: self.mask }
     }
 
     /// The motion of most tracks.
@@ -97,7 +131,12 @@ impl FramePair<'_> {
         let own = &self.config.maximum_likelihood;
         let options = &MaximumLikelihoodOptions { seed: own.seed ^ self.config.seed, ..*own };
         let start = robust_start(tracks, self.rig, prior, options)?;
-        Ok(maximum_likelihood(tracks, self.rig, &start, None, &options.kernel)?.motion.phi())
+        self.refined(tracks, &start)
+    }
+
+    fn refined(&self, tracks: &[StereoTrack], start: &Twist) -> Result<Twist, Unsolvable> {
+        let kernel = &self.config.maximum_likelihood.kernel;
+        Ok(maximum_likelihood(tracks, self.rig, start, None, kernel)?.motion.phi())
     }
 
     fn sparse(
@@ -119,6 +158,7 @@ impl FramePair<'_> {
             impact,
             flow: None,
             maps: None,
+            corners: Vec::new(),
         }
     }
 
@@ -134,6 +174,7 @@ impl FramePair<'_> {
             impact: None,
             flow: None,
             maps: None,
+            corners: Vec::new(),
         };
         let (Some(before), Some(after)) = (&self.before.disparity, &self.after.disparity) else {
             return nothing(Unanswered::Unsolvable(Unsolvable::FewRows { rows: 0, needed: 6 }));
@@ -176,6 +217,7 @@ impl FramePair<'_> {
             impact: nearest(&mut seen),
             maps: Some(maps),
             flow: Some(flow),
+            corners: Vec::new(),
         }
     }
 

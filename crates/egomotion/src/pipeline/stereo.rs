@@ -134,6 +134,8 @@ pub struct StereoMotion {
     reference: Option<Reference>,
     /// Velocity per second from the last answer.
     velocity: Option<Twist>,
+    /// The memory of a frame that is no longer needed.
+    spare: Option<StereoPyramid>,
     /// Frames since the reference that gave no answer though their images were good.
     failures: usize,
 }
@@ -161,6 +163,7 @@ impl StereoMotion {
             last_time_s: None,
             reference: None,
             velocity: None,
+            spare: None,
             failures: 0,
         })
     }
@@ -205,7 +208,14 @@ impl StereoMotion {
         self.last_time_s = Some(frame.time_s);
         let mut stages = StageTimes::default();
         let images = timed(&mut stages.pyramids_ms, || {
-            StereoPyramid::new(frame.left, frame.right, self.config.tracks.pyramid_levels)
+            let levels = self.config.tracks.pyramid_levels;
+            match self.spare.take() {
+                Some(mut spare) => {
+                    spare.renew(&frame.left, &frame.right, levels);
+                    spare
+                }
+                None => StereoPyramid::new(&frame.left, &frame.right, levels),
+            }
         });
         let disparity = (self.config.observe == Observe::Dense).then(|| {
             timed(&mut stages.disparity_ms, || {
@@ -217,8 +227,13 @@ impl StereoMotion {
                 Some(map)
             })
         });
-        let here =
-            Reference { frame: self.frames, time_s: frame.time_s, images, disparity: disparity.flatten() };
+        let here = Reference {
+            frame: self.frames,
+            time_s: frame.time_s,
+            images,
+            disparity: disparity.flatten(),
+            corners: Vec::new(),
+        };
         let Some(before) = self.reference.take() else {
             let first = self.skip(here.time_s, Unanswered::First);
             self.reference = Some(here);
@@ -242,7 +257,7 @@ impl StereoMotion {
                 .map(|((flow, motion), disparity)| DenseResults { disparity, flow, motion }),
             stages,
         };
-        self.remember(&answer, before, here);
+        self.remember(&answer, before, Reference { corners: result.corners, ..here });
         answer
     }
 
@@ -276,15 +291,33 @@ impl StereoMotion {
             (Ok(motion), Some(dt)) if motion.is_complete() => Some(motion.phi().scaled(1.0 / dt)),
             _ => None,
         };
-        self.reference = Some(if keep_old { before } else { here });
+        let (kept, gone) = if keep_old { (before, here) } else { (here, before) };
+        self.reference = Some(kept);
+        self.spare = Some(gone.images);
     }
 }
 
-/// Standard deviation of the grey levels.
+/// Standard deviation of the grey levels; NaN if one of them is not a number.
 fn contrast(image: &Image) -> f64 {
-    let n = image.values().len() as f64;
-    let mean = image.values().iter().map(|&v| f64::from(v)).sum::<f64>() / n;
-    (image.values().iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / n).sqrt()
+    const LANES: usize = 8;
+    let n = image.values().len().max(1) as f64;
+    // Differences from one grey level: squares of the levels themselves would cancel.
+    let level = f64::from(image.values().first().copied().unwrap_or(0.0));
+    let (mut sums, mut squares) = ([0.0; LANES], [0.0; LANES]);
+    let (chunks, rest) = image.values().as_chunks::<LANES>();
+    for chunk in chunks {
+        for i in 0..LANES {
+            let x = f64::from(chunk[i]) - level;
+            sums[i] += x;
+            squares[i] += x * x;
+        }
+    }
+    let rest = rest.iter().map(|&v| f64::from(v) - level);
+    let mean = (sums.iter().sum::<f64>() + rest.clone().sum::<f64>()) / n;
+    let square = (squares.iter().sum::<f64>() + rest.map(|x| x * x).sum::<f64>()) / n;
+    let variance = square - mean * mean;
+    // Rounding may make it negative, and comparisons must let NaN through.
+    if variance < 0.0 { 0.0 } else { variance.sqrt() }
 }
 
 /// Clear the pixels that the mask excludes.
