@@ -6,10 +6,16 @@
 
 mod census;
 mod check;
+mod fill;
+mod lanes;
 mod lucas_kanade;
 mod semi_global;
+mod speckles;
 mod subpixel;
+mod surface;
+mod sweep;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use census::CensusWindow;
@@ -40,6 +46,8 @@ pub struct DisparityOptions {
     pub speckle_size: usize,
     /// Difference of disparity that still connects neighbours, in pixels.
     pub speckle_range: f32,
+    /// Whether gaps no wider than `levels` are filled along the row, with a large standard deviation.
+    pub fill: bool,
     /// Steps of sub-pixel refinement, at least 1.
     pub refinement_steps: usize,
 }
@@ -49,15 +57,16 @@ impl Default for DisparityOptions {
         Self {
             levels: 128,
             census: CensusWindow::default(),
-            penalty_small: 20,
-            penalty_large: 190,
-            penalty_large_least: 50,
+            penalty_small: 10,
+            penalty_large: 54,
+            penalty_large_least: 24,
             edge_contrast: 4.0,
             uniqueness: 0.01,
             left_right_tolerance: 2,
             speckle_size: 100,
             speckle_range: 1.0,
-            refinement_steps: 3,
+            fill: true,
+            refinement_steps: 2,
         }
     }
 }
@@ -101,12 +110,11 @@ pub enum DisparityError {
 #[derive(Debug, Clone, Default)]
 pub struct DisparityMatcher {
     options: DisparityOptions,
-    smoothed: Vec<f32>,
-    left_words: Vec<u64>,
-    right_words: Vec<u64>,
+    left_words: census::Census,
+    right_words: census::Census,
     semi_global: semi_global::SemiGlobal,
     winners: Vec<f32>,
-    speckles: check::Speckles,
+    speckles: speckles::Speckles,
     refinement: subpixel::Refinement,
 }
 
@@ -137,20 +145,24 @@ impl DisparityMatcher {
             return Ok(map);
         }
         let options = &self.options;
-        census::transform(left, options.census, &mut self.smoothed, &mut self.left_words);
-        census::transform(right, options.census, &mut self.smoothed, &mut self.right_words);
+        let scale = census::grey_scale([left, right]);
+        self.left_words.compute(left, options.census, scale, false);
+        self.right_words.compute(right, options.census, scale, true);
         self.winners.resize(width * height, f32::NAN);
         let pair =
             semi_global::Pair { left, left_words: &self.left_words, right_words: &self.right_words, levels };
         self.semi_global.winners(&pair, options, &mut self.winners);
         let (size, range) = (options.speckle_size, options.speckle_range);
-        check::remove_speckles(&mut self.winners, width, size, range, &mut self.speckles);
+        self.speckles.remove(&mut self.winners, width, size, range);
         self.refinement.refine(left, right, &self.winners, options.refinement_steps.max(1));
-        for v in 0..height {
-            let (shift, sigma) = self.refinement.row(v);
-            map.shift.row_mut(v).copy_from_slice(shift);
-            map.sigma.row_mut(v).copy_from_slice(sigma);
-        }
+        let rows = (map.shift.rows_mut()).zip(map.sigma.rows_mut());
+        rows.zip(self.refinement.rows()).for_each(|((to_shift, to_sigma), (shift, sigma))| {
+            to_shift.copy_from_slice(shift);
+            to_sigma.copy_from_slice(sigma);
+            if options.fill {
+                fill::fill_row(to_shift, to_sigma, levels);
+            }
+        });
         Ok(map)
     }
 }
