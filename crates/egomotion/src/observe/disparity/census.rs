@@ -42,20 +42,25 @@ impl CensusWindow {
         if self == Self::Symmetric { neighbours / 2 } else { neighbours }
     }
 
-    /// What is compared: pairs of (column, row) counted from the window's top left.
-    fn comparisons(self) -> Vec<[(usize, usize); 2]> {
+    /// What is compared, filled up to whole bytes with comparisons that never hold.
+    fn comparisons(self) -> Vec<Comparison> {
         let (ru, rv) = self.radii();
         let (width, height) = (2 * ru + 1, 2 * rv + 1);
         let pixels: Vec<_> = (0..width * height).map(|i| (i % width, i / width)).collect();
         let centre = pixels.len() / 2;
-        match self {
+        let mut comparisons: Vec<Comparison> = match self {
             Self::Symmetric => {
                 pixels[..centre].iter().map(|&(i, j)| [(i, j), (2 * ru - i, 2 * rv - j)]).collect()
             }
             _ => pixels.iter().filter(|&&p| p != pixels[centre]).map(|&p| [p, pixels[centre]]).collect(),
-        }
+        };
+        comparisons.resize(comparisons.len().next_multiple_of(BITS), [pixels[centre]; 2]);
+        comparisons
     }
 }
+
+/// Two pixels of the window, as (column, row) counted from its top left.
+type Comparison = [(usize, usize); 2];
 
 /// Largest matching cost: of words of more bits half the distance counts.
 pub(super) const LARGEST_COST: u8 = 31;
@@ -199,7 +204,7 @@ fn whole(x: f32) -> i16 {
 /// The bytes of a row from the smoothed rows of its window.
 struct Compare<'a> {
     rows: &'a [&'a [i16]],
-    comparisons: &'a [[(usize, usize); 2]],
+    comparisons: &'a [Comparison],
     bytes: &'a mut [u8],
     stride: usize,
 }
@@ -208,22 +213,81 @@ impl Kernel for Compare<'_> {
     type Output = ();
     #[inline(always)]
     fn run<B: Bytes>(self) {
-        for (plane, comparisons) in
-            self.bytes.chunks_exact_mut(self.stride).zip(self.comparisons.chunks(BITS))
-        {
+        let planes = self.bytes.chunks_exact_mut(self.stride).zip(self.comparisons.as_chunks::<BITS>().0);
+        for (plane, comparisons) in planes {
+            let line = |(i, j): (usize, usize)| &self.rows[j][i..i + self.stride];
+            let lines = comparisons.map(|[a, b]| [line(a), line(b)]);
             for (part, bytes) in plane.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+                let at = part * LANES..(part + 1) * LANES;
                 let mut bits = [0_i16; LANES];
-                for &[(i, j), (k, l)] in comparisons {
-                    let at = part * LANES;
-                    let a: &[i16] = &self.rows[j][at + i..at + i + LANES];
-                    let b: &[i16] = &self.rows[l][at + k..at + k + LANES];
-                    for lane in 0..LANES {
-                        bits[lane] = bits[lane] << 1 | i16::from(a[lane] < b[lane]);
+                for [a, b] in lines {
+                    for (bits, (a, b)) in bits.iter_mut().zip(a[at.clone()].iter().zip(&b[at.clone()])) {
+                        *bits = *bits << 1 | i16::from(a < b);
                     }
                 }
-                for lane in 0..LANES {
-                    bytes[lane] = bits[lane] as u8;
+                for (byte, bits) in bytes.iter_mut().zip(bits) {
+                    *byte = bits as u8;
                 }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WINDOWS: [CensusWindow; 4] = [
+        CensusWindow::FiveByFive,
+        CensusWindow::SevenBySeven,
+        CensusWindow::NineBySeven,
+        CensusWindow::Symmetric,
+    ];
+
+    fn census(image: &Image, window: CensusWindow, mirrored: bool) -> Census {
+        let mut census = Census::default();
+        census.compute(image, window, grey_scale([image, image]), mirrored);
+        census
+    }
+
+    /// The bytes of the word of a pixel.
+    fn word(census: &Census, u: usize, v: usize) -> Vec<u8> {
+        (0..census.planes).map(|k| census.row(v)[k * census.stride + u]).collect()
+    }
+
+    #[test]
+    fn words_depend_on_order_alone() {
+        let image = Image::from_fn(13, 11, |u, v| ((u * 37 + v * 101) % 53) as f32);
+        let brighter = Image::from_fn(13, 11, |u, v| 7.0 + 300.0 * image.at(u, v));
+        for window in WINDOWS {
+            let (a, b) = (census(&image, window, false), census(&brighter, window, false));
+            assert_eq!(a.bytes, b.bytes);
+        }
+    }
+
+    #[test]
+    fn every_comparison_has_its_bit() {
+        let mut peak = Image::filled(15, 15, 1.0);
+        peak.set(7, 7, 2.0);
+        for window in WINDOWS {
+            let census = census(&peak, window, false);
+            let bits = |u, v| word(&census, u, v).iter().map(|b| b.count_ones()).sum::<u32>();
+            // Smoothing spreads the peak over 3 × 3 pixels; all others are nowhere brighter. Of pixels
+            // opposite of the middle none differ.
+            let expected = if window == CensusWindow::Symmetric { 0 } else { window.bits() };
+            assert_eq!(bits(7, 7), expected);
+            let set = (0..225).filter(|i| bits(i % 15, i / 15) > 0).count();
+            assert_eq!(set, if window == CensusWindow::Symmetric { set } else { 9 });
+        }
+    }
+
+    #[test]
+    fn a_mirrored_image_has_the_same_words_in_turn() {
+        let image = Image::from_fn(40, 9, |u, v| ((u * 29 + v * 83) % 47) as f32);
+        for window in WINDOWS {
+            let (plain, mirrored) = (census(&image, window, false), census(&image, window, true));
+            for (u, v) in (0..360).map(|i| (i % 40, i / 40)) {
+                assert_eq!(word(&plain, u, v), word(&mirrored, 39 - u, v));
             }
         }
     }

@@ -20,8 +20,6 @@ pub(super) trait Bytes: Copy {
     fn plus(self, other: Self) -> Self;
     /// Difference, 0 at least.
     fn minus(self, other: Self) -> Self;
-    /// Mean, half rounded up.
-    fn mean(self, other: Self) -> Self;
     /// Number of bits in which each byte differs from that of `other`.
     fn distance(self, other: Self) -> Self;
     /// Larger of each two.
@@ -94,10 +92,6 @@ impl Bytes for Array {
     #[inline(always)]
     fn minus(self, other: Self) -> Self {
         self.with(other, u8::saturating_sub)
-    }
-    #[inline(always)]
-    fn mean(self, other: Self) -> Self {
-        self.with(other, |a, b| ((u16::from(a) + u16::from(b) + 1) >> 1) as u8)
     }
     #[inline(always)]
     fn distance(self, other: Self) -> Self {
@@ -174,10 +168,6 @@ mod avx2 {
             Self(unsafe { _mm256_subs_epu8(self.0, other.0) })
         }
         #[inline(always)]
-        fn mean(self, other: Self) -> Self {
-            Self(unsafe { _mm256_avg_epu8(self.0, other.0) })
-        }
-        #[inline(always)]
         fn distance(self, other: Self) -> Self {
             // The bits of each half byte, looked up.
             const COUNTS: [u8; LANES] = {
@@ -251,13 +241,17 @@ pub(super) trait Kernel {
 /// Run a kernel with the widest vectors of this processor.
 pub(super) fn widest<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        #[target_feature(enable = "avx2")]
+    if std::arch::is_x86_feature_detected!("avx2")
+        && std::arch::is_x86_feature_detected!("bmi1")
+        && std::arch::is_x86_feature_detected!("popcnt")
+    {
+        // Of the three no processor with AVX2 lacks any.
+        #[target_feature(enable = "avx2,bmi1,popcnt")]
         fn wide<K: Kernel>(kernel: K) -> K::Output {
             kernel.run::<avx2::Register>()
         }
-        #[allow(unsafe_code, reason = "the line above asks whether the processor has AVX2")]
-        // SAFETY: it has.
+        #[allow(unsafe_code, reason = "the lines above ask whether the processor has the instructions")]
+        // SAFETY: it has them.
         return unsafe { wide(kernel) };
     }
     kernel.run::<Array>()

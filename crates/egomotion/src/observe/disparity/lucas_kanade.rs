@@ -73,12 +73,13 @@ impl Kernel for FitRow<'_, '_> {
 
 /// Sums over the rows, of the columns from `first` on.
 #[inline(always)]
-fn down(rows: &[Differences<'_>], first: usize) -> [[f32; WIDE]; SUMS] {
+fn down<'a>(rows: &[Differences<'a>], first: usize) -> [[f32; WIDE]; SUMS] {
     let mut sums = [[0.0; WIDE]; SUMS];
     let [n, g, e, gg, ge, ee] = &mut sums;
     for row in rows {
-        let piece = |line: &'_ [f32]| line[first..].first_chunk::<WIDE>().copied().unwrap_or([0.0; WIDE]);
-        let (w, s, d) = (piece(row.weight), piece(row.slope), piece(row.difference));
+        let piece = |line: &'a [f32]| line[first..].first_chunk::<WIDE>();
+        let pieces = (piece(row.weight), piece(row.slope), piece(row.difference));
+        let (Some(w), Some(s), Some(d)) = pieces else { continue };
         for i in 0..WIDE {
             n[i] += w[i];
             g[i] += s[i];

@@ -1,8 +1,8 @@
 //! Dense disparity of a rectified pair, with its standard deviation.
 //!
-//! Four steps: census words of both images, semi-global matching, checks that decide which winners
-//! to believe, and photometric sub-pixel refinement. Pixels without a believed match, such as
-//! those hidden from one camera, stay missing: nothing is filled in.
+//! Five steps: census words of both images, semi-global matching, checks that decide which winners
+//! to believe, photometric sub-pixel refinement, and holes filled from either side. What is filled
+//! in has a standard deviation of [`GUESS_SIGMA_PX`] and more; wide holes stay missing.
 
 mod census;
 mod check;
@@ -70,6 +70,13 @@ impl Default for DisparityOptions {
         }
     }
 }
+
+/// Standard deviation from which on a disparity is a guess and no measurement, in pixels: all that
+/// is filled in, and where grey levels contradict the matching.
+///
+/// Such values tell where surfaces are; motion is not to be estimated from them, for their errors
+/// are systematic: an occluded pixel keeps its side of the object.
+pub const GUESS_SIGMA_PX: f32 = 1.0;
 
 /// Disparity of the left image's pixels.
 #[derive(Debug, Clone, PartialEq)]

@@ -228,28 +228,105 @@ impl Kernel for Compare<'_> {
     fn run<B: Bytes>(self) {
         let Self { left, right, disparity, weight, slope, difference } = self;
         let width = left.len();
-        // The margins stay 0 and missing; the first and the last pixel have no slope.
-        let (first, last) = (0, width.saturating_sub(1));
-        for u in [first, last] {
-            (weight[u], slope[u], difference[u]) = (0.0, 0.0, 0.0);
+        if width < 4 {
+            [weight, slope, difference].into_iter().for_each(|line| line.fill(0.0));
+            return;
         }
-        for u in 1..last {
-            let at = u as f32 - disparity[u];
-            // Of NaN this is false.
-            if at >= 1.0 && at < width as f32 - 2.0 {
-                let first = at as usize - 1;
-                let taps = &right[first..first + 4];
-                let w = spline::weights(at - (first + 1) as f32);
-                let grey = w[0] * taps[0] + w[1] * taps[1] + w[2] * taps[2] + w[3] * taps[3];
-                difference[u] = left[u] - grey;
-                // The right image's own slope would carry the noise of the grey level read there,
-                // and pull every answer towards half pixels.
-                slope[u] = 0.5 * (left[u + 1] - left[u - 1]);
-                weight[u] = 1.0;
-            } else {
-                (weight[u], slope[u], difference[u]) = (0.0, 0.0, 0.0);
+        for first in (0..width).step_by(TILE) {
+            let here = first..(first + TILE).min(width);
+            let mut tile = Tile::new(first, left, &disparity[here.clone()]);
+            tile.split(width);
+            for (i, &from) in tile.from.iter().enumerate() {
+                let Some(taps) = right.get(from as usize..from as usize + 4) else { continue };
+                for (line, &tap) in tile.taps.iter_mut().zip(taps) {
+                    line[i] = tap;
+                }
+            }
+            let lines = tile.compare(width);
+            let outputs = [&mut weight[here.clone()], &mut slope[here.clone()], &mut difference[here]];
+            for (output, line) in outputs.into_iter().zip(&lines) {
+                output.copy_from_slice(&line[..output.len()]);
             }
         }
+        // The first and the last pixel have no slope.
+        for u in [0, width - 1] {
+            (weight[u], slope[u], difference[u]) = (0.0, 0.0, 0.0);
+        }
+    }
+}
+
+/// Pixels compared at a time.
+const TILE: usize = 64;
+
+/// Some pixels of the left row, and what the right row has for them.
+struct Tile {
+    /// Grey levels from one pixel before the first to one after the last.
+    left: [f32; TILE + 2],
+    /// Where in the right row each pixel is looked for.
+    at: [f32; TILE],
+    /// The first of the four coefficients around, and how far `at` is beyond the second.
+    from: [u32; TILE],
+    fraction: [f32; TILE],
+    taps: [[f32; TILE]; 4],
+}
+
+impl Tile {
+    #[inline(always)]
+    fn new(first: usize, left: &[f32], disparity: &[f32]) -> Self {
+        let mut tile = Self {
+            left: [0.0; TILE + 2],
+            at: [f32::NAN; TILE],
+            from: [0; TILE],
+            fraction: [0.0; TILE],
+            taps: [[0.0; TILE]; 4],
+        };
+        let start = first.saturating_sub(1);
+        let grey = &left[start..(first + TILE + 1).min(left.len())];
+        let offset = start + 1 - first;
+        tile.left[offset..offset + grey.len()].copy_from_slice(grey);
+        for (i, (at, d)) in tile.at.iter_mut().zip(disparity).enumerate() {
+            *at = (first + i) as f32 - d;
+        }
+        tile
+    }
+
+    /// Whole pixel and fraction of each place inside; anything elsewhere.
+    #[inline(always)]
+    fn split(&mut self, width: usize) {
+        // Added to less than 2²³ this leaves the whole number in the last bits: a few operations on
+        // vectors, where a checked conversion takes many.
+        const LAST_BIT_IS_ONE: f32 = 8_388_608.0;
+        let last = width as f32 - 3.0;
+        for i in 0..TILE {
+            let at = self.at[i];
+            let inside = if at >= 1.0 { at } else { 1.0 };
+            let inside = if inside <= last { inside } else { last };
+            let whole = inside - 0.5 + LAST_BIT_IS_ONE;
+            self.from[i] = (whole.to_bits() & 0x7f_ffff).saturating_sub(1);
+            self.fraction[i] = inside - (whole - LAST_BIT_IS_ONE);
+        }
+    }
+
+    /// Weight, slope and difference of each pixel.
+    #[inline(always)]
+    fn compare(&self, width: usize) -> [[f32; TILE]; 3] {
+        let mut lines = [[0.0; TILE]; 3];
+        let [weight, slope, difference] = &mut lines;
+        let [a, b, c, d] = &self.taps;
+        let end = width as f32 - 2.0;
+        for i in 0..TILE {
+            let at = self.at[i];
+            // Of NaN this is false.
+            let inside = at >= 1.0 && at < end;
+            let w = spline::weights(self.fraction[i]);
+            let grey = w[0] * a[i] + w[1] * b[i] + w[2] * c[i] + w[3] * d[i];
+            weight[i] = if inside { 1.0 } else { 0.0 };
+            // The right image's own slope would carry the noise of the grey level read there, and
+            // pull every answer towards half pixels.
+            slope[i] = if inside { 0.5 * (self.left[i + 2] - self.left[i]) } else { 0.0 };
+            difference[i] = if inside { self.left[i + 1] - grey } else { 0.0 };
+        }
+        lines
     }
 }
 

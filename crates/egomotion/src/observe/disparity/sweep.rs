@@ -186,8 +186,11 @@ impl<const BLOCKS: usize> Kernel for Back<'_, BLOCKS> {
         let mut leftward = Along::<B, BLOCKS>::start();
         let mut total = [[0_u8; LANES]; BLOCKS];
         let width = self.best.len();
-        // A cost that makes another one of `cost` a rival.
-        let rival = |cost: u8| (f32::from(cost) / (1.0 - self.uniqueness)).clamp(0.0, 254.0) as u8;
+        // Up to which cost another level is a rival of the winner.
+        let mut rivals_of = [0_u8; 256];
+        for (cost, rival) in rivals_of.iter_mut().enumerate().map(|(cost, rival)| (cost as f32, rival)) {
+            *rival = (cost / (1.0 - self.uniqueness)).max(cost).min(254.0) as u8;
+        }
         for u in (0..width).rev() {
             let p2 = B::splat(*self.p2_left.get(u + 1).unwrap_or(&0));
             let matching = &self.matching[u * stride..(u + 1) * stride];
@@ -209,7 +212,8 @@ impl<const BLOCKS: usize> Kernel for Back<'_, BLOCKS> {
             }
             let least = least.least();
             let least_cost = least.to_array()[0];
-            let bound = B::splat(rival(least_cost));
+            let rival = rivals_of[usize::from(least_cost)];
+            let bound = B::splat(rival);
             let mut level = 0;
             let mut rivals = 0_u32;
             for block in (0..BLOCKS).rev() {
@@ -221,7 +225,7 @@ impl<const BLOCKS: usize> Kernel for Back<'_, BLOCKS> {
             let total = total.as_flattened();
             let below = if level > 0 { total[level - 1] } else { WALL };
             let above = if level + 1 < self.levels { total[level + 1] } else { WALL };
-            let own = 1 + u32::from(below <= rival(least_cost)) + u32::from(above <= rival(least_cost));
+            let own = 1 + u32::from(below <= rival) + u32::from(above <= rival);
             let inside = self.levels.min(u + 1);
             self.best[u] = Winner {
                 level: level as u16,
