@@ -9,6 +9,7 @@ mod check;
 mod fill;
 mod lanes;
 mod lucas_kanade;
+mod rows;
 mod semi_global;
 mod speckles;
 mod subpixel;

@@ -11,24 +11,25 @@ use rayon::prelude::*;
 
 use super::lanes::{Bytes, Kernel, widest};
 use super::lucas_kanade::{Differences, Fit, FitRow, row_length};
+use super::rows::{RowOffset, beside};
 use super::surface::{RADIUS, SurfaceMean};
 use crate::geometry::Image;
 use crate::observe::spline;
 
 /// Standard deviation of the semi-global disparity, in pixels.
-const PRIOR_SIGMA: f32 = 0.5;
+const PRIOR_SIGMA: f32 = 0.4;
 /// Standard deviation where the refinement contradicts the semi-global disparity, in pixels.
 const CONTRADICTED_SIGMA: f32 = 1.0;
 /// Correction of the semi-global disparity beyond which it counts as contradicted, in pixels.
 const CONTRADICTION: f32 = 1.0;
 /// What no image noise explains (interpolation), in pixels.
-const MODEL_SIGMA: f32 = 0.01;
+const MODEL_SIGMA: f32 = 0.02;
 /// Variance, in squares of the last step, for the depth inside a window that no one step fits;
 /// measured on Middlebury pairs.
-const MISFIT_WEIGHT: f32 = 2.5;
+const MISFIT_WEIGHT: f32 = 1.0;
 /// Growth of the standard deviation where the window is not all of one surface, beside edges and
 /// holes; measured on Middlebury and KITTI pairs.
-const STRAY_WEIGHT: f32 = 2.0;
+const STRAY_WEIGHT: f32 = 4.0;
 
 /// Offset of the minimum of the parabola through three neighbouring costs, −½ … ½; 0 beside the
 /// end of the levels (255) and where there is no minimum.
@@ -76,13 +77,17 @@ impl Refinement {
         let stride = self.stride();
         let rows = self.refined.par_chunks_mut(stride).zip(coarse.par_chunks(self.width));
         rows.for_each(|(row, coarse)| row[RADIUS.0..][..coarse.len()].copy_from_slice(coarse));
+        let mut offset = RowOffset::default();
         for step in 0..steps {
             self.smooth();
             if step == 0 {
                 // All later steps start from here; what they compare at is written anew.
                 std::mem::swap(&mut self.prior, &mut self.disparity);
             }
-            self.compare(left, &right, step == 0);
+            self.compare(left, &right, step == 0, offset);
+            if step == 0 && steps > 1 {
+                offset = self.row_offset(left);
+            }
             let typical_noise = self.typical_noise();
             self.solve(typical_noise, step == 0);
         }
@@ -151,7 +156,7 @@ impl Refinement {
     }
 
     /// Compare the left image with the right one (as row coefficients) read at the disparity of each pixel.
-    fn compare(&mut self, left: &Image, right: &Image, first: bool) {
+    fn compare(&mut self, left: &Image, right: &Image, first: bool, offset: RowOffset) {
         let (stride, width) = (self.stride(), self.width);
         let disparity = if first { &self.prior } else { &self.disparity };
         let planes = (disparity.par_chunks(stride))
@@ -160,8 +165,12 @@ impl Refinement {
             .zip(self.difference.par_chunks_mut(stride));
         planes.enumerate().for_each(|(v, (((disparity, weight), slope), difference))| {
             let inner = RADIUS.0..RADIUS.0 + width;
+            let (above, below) = beside(left, v);
             widest(Compare {
                 left: left.row(v),
+                above,
+                below,
+                row_offset: offset.along(v),
                 right: right.row(v),
                 disparity: &disparity[inner.clone()],
                 weight: &mut weight[inner.clone()],
@@ -169,6 +178,13 @@ impl Refinement {
                 difference: &mut difference[inner],
             });
         });
+    }
+
+    /// The disagreement of rows that the first comparison shows.
+    fn row_offset(&self, left: &Image) -> RowOffset {
+        let inner = RADIUS.0..RADIUS.0 + self.width;
+        let rows = self.difference.par_chunks(self.stride()).zip(self.slope.par_chunks(self.stride()));
+        RowOffset::fit(left, rows.map(|(e, g)| (&e[inner.clone()], &g[inner.clone()])))
     }
 
     /// Median over the image of the noise variance of the last step; `None` before the first.
@@ -214,6 +230,11 @@ impl Refinement {
 /// A row of the left image against the right one, each pixel at its disparity.
 struct Compare<'a> {
     left: &'a [f32],
+    /// The left image's rows above and below.
+    above: &'a [f32],
+    below: &'a [f32],
+    /// Right row minus left row at the first pixel, and its growth from pixel to pixel.
+    row_offset: (f32, f32),
     /// Spline coefficients.
     right: &'a [f32],
     disparity: &'a [f32],
@@ -226,7 +247,7 @@ impl Kernel for Compare<'_> {
     type Output = ();
     #[inline(always)]
     fn run<B: Bytes>(self) {
-        let Self { left, right, disparity, weight, slope, difference } = self;
+        let Self { left, above, below, row_offset, right, disparity, weight, slope, difference } = self;
         let width = left.len();
         if width < 4 {
             [weight, slope, difference].into_iter().for_each(|line| line.fill(0.0));
@@ -242,7 +263,19 @@ impl Kernel for Compare<'_> {
                     line[i] = tap;
                 }
             }
-            let lines = tile.compare(width);
+            let mut lines = tile.compare(width);
+            let mut down = [0.0; TILE];
+            for (down, (above, below)) in
+                down.iter_mut().zip(above[here.clone()].iter().zip(&below[here.clone()]))
+            {
+                *down = 0.5 * (below - above);
+            }
+            // What is seen of another row: it has no part in disparity.
+            let [weight_here, _, difference_here] = &mut lines;
+            for i in 0..TILE {
+                let rows = row_offset.0 + row_offset.1 * (first + i) as f32;
+                difference_here[i] -= weight_here[i] * rows * down[i];
+            }
             let outputs = [&mut weight[here.clone()], &mut slope[here.clone()], &mut difference[here]];
             for (output, line) in outputs.into_iter().zip(&lines) {
                 output.copy_from_slice(&line[..output.len()]);
