@@ -1,5 +1,7 @@
 //! Planes of pixels: images, and dense fields whose missing values are explicit.
 
+use rayon::prelude::*;
+
 /// A row-major plane of `width` × `height` values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid<T> {
@@ -173,6 +175,12 @@ impl Field {
         let du = 0.5 * (self.0.at(u + 1, v) - self.0.at(u - 1, v));
         let dv = 0.5 * (self.0.at(u, v + 1) - self.0.at(u, v - 1));
         Some((du, dv)).filter(|(a, b)| !a.is_nan() && !b.is_nan())
+    }
+
+    /// All rows in parallel, missing pixels as NaN.
+    pub fn rows_mut(&mut self) -> impl IndexedParallelIterator<Item = &mut [f32]> {
+        let width = self.width().max(1);
+        self.0.values.par_chunks_mut(width)
     }
 
     /// Number of pixels that have a value.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 
-use super::disparity::DisparityMap;
+use super::disparity::{DisparityMap, GUESS_SIGMA_PX};
 use super::flow::FlowField;
 use super::observation::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 use crate::geometry::{Gaussian, StereoRig};
@@ -44,7 +44,8 @@ impl DensePair<'_> {
     /// (x, y, d) at t with its covariance: the pixel is exact, disparity is measured.
     fn before(&self, u: usize, v: usize) -> Option<Gaussian<3>> {
         let d = self.rig.disparity_from_shift(f64::from(self.before.shift.get(u, v)?));
-        let sigma = f64::from(self.before.sigma.get(u, v)?);
+        let sigma = self.before.sigma.get(u, v).filter(|&sigma| sigma < GUESS_SIGMA_PX)?;
+        let sigma = f64::from(sigma);
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
         (d > 0.0).then(|| Gaussian::independent([x, y, d], [0.0, 0.0, sigma * sigma]))
     }
@@ -170,7 +171,8 @@ fn joint(place: &Matrix2<f64>, cross: Vector2<f64>, variance: f64) -> Matrix3<f6
     )
 }
 
-/// Disparity at image coordinates (x, y) with its variance, and its gradient there by central differences.
+/// Disparity measured at image coordinates (x, y) with its variance, and its gradient there by central
+/// differences.
 fn disparity_at(rig: &StereoRig, map: &DisparityMap, x: f64, y: f64) -> Option<(Gaussian<1>, Vector2<f64>)> {
     let (u, v) = rig.pixel_from_image(x, y);
     let shift = |du: f64, dv: f64| map.shift.sample(u + du, v + dv);
@@ -182,7 +184,8 @@ fn disparity_at(rig: &StereoRig, map: &DisparityMap, x: f64, y: f64) -> Option<(
     );
     // Beyond one pixel of disparity per pixel the stencil straddles a depth edge.
     let on_surface = gradient.amax() < 1.0;
-    (d > 0.0 && on_surface).then(|| (Gaussian::scalar(d, sigma * sigma), gradient))
+    let measured = sigma < f64::from(GUESS_SIGMA_PX);
+    (d > 0.0 && on_surface && measured).then(|| (Gaussian::scalar(d, sigma * sigma), gradient))
 }
 
 #[cfg(test)]

@@ -1,25 +1,28 @@
 //! The census transform: each pixel as the order of its neighbourhood.
 //!
-//! R. Zabih, J. Woodfill, "Non-parametric local transforms for computing visual correspondence", ECCV 1994.
-
-use std::cmp::Ordering;
+//! R. Zabih, J. Woodfill, "Non-parametric local transforms for computing visual correspondence",
+//! ECCV 1994; R. Spangenberg, T. Langner, R. Rojas, "Weighted semi-global matching and
+//! center-symmetric census transform for robust driver assistance", CAIP 2013.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::lanes::{Bytes, Kernel, LANES, widest};
 use crate::geometry::Image;
 
 /// The neighbourhood of the census transform, width × height in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CensusWindow {
-    /// 5 × 5, 24 bits: sharper depth edges, less robust.
-    FiveByFive,
-    /// 7 × 7, 48 bits.
-    SevenBySeven,
-    /// 9 × 7, 62 bits.
+    /// 5 × 5 against the centre, 24 bits: sharp depth edges.
     #[default]
+    FiveByFive,
+    /// 7 × 7 against the centre, 48 bits.
+    SevenBySeven,
+    /// 9 × 7 against the centre, 62 bits.
     NineBySeven,
+    /// 9 × 7, each pixel against the one opposite of the centre, 31 bits: half the work.
+    Symmetric,
 }
 
 impl CensusWindow {
@@ -28,68 +31,205 @@ impl CensusWindow {
         match self {
             Self::FiveByFive => (2, 2),
             Self::SevenBySeven => (3, 3),
-            Self::NineBySeven => (4, 3),
+            Self::NineBySeven | Self::Symmetric => (4, 3),
         }
     }
 
-    /// Number of neighbours compared, at most 64: the greatest Hamming distance.
+    /// Number of comparisons, at most 64: the greatest Hamming distance.
     pub fn bits(self) -> u32 {
         let (ru, rv) = self.radii();
-        ((2 * ru + 1) * (2 * rv + 1) - 1) as u32
+        let neighbours = ((2 * ru + 1) * (2 * rv + 1) - 1) as u32;
+        if self == Self::Symmetric { neighbours / 2 } else { neighbours }
+    }
+
+    /// What is compared, filled up to whole bytes with comparisons that never hold.
+    fn comparisons(self) -> Vec<Comparison> {
+        let (ru, rv) = self.radii();
+        let (width, height) = (2 * ru + 1, 2 * rv + 1);
+        let pixels: Vec<_> = (0..width * height).map(|i| (i % width, i / width)).collect();
+        let centre = pixels.len() / 2;
+        let mut comparisons: Vec<Comparison> = match self {
+            Self::Symmetric => {
+                pixels[..centre].iter().map(|&(i, j)| [(i, j), (2 * ru - i, 2 * rv - j)]).collect()
+            }
+            _ => pixels.iter().filter(|&&p| p != pixels[centre]).map(|&p| [p, pixels[centre]]).collect(),
+        };
+        comparisons.resize(comparisons.len().next_multiple_of(BITS), [pixels[centre]; 2]);
+        comparisons
     }
 }
 
-/// The census words of an image, row by row: bit = neighbour darker than the pixel.
+/// Two pixels of the window, as (column, row) counted from its top left.
+type Comparison = [(usize, usize); 2];
+
+/// Largest matching cost: of words of more bits half the distance counts.
+pub(super) const LARGEST_COST: u8 = 31;
+/// Bits of a word that lie side by side in a plane.
+const BITS: usize = 8;
+
+/// The census words of an image as planes of bytes, eight comparisons in each.
 ///
-/// The image is smoothed first (binomial, 3 × 3): that calms the noise of the order, and forgives
-/// the fractions of a row by which rectification is wrong. Outside the image the nearest pixel counts.
-pub(super) fn transform(image: &Image, window: CensusWindow, smoothed: &mut Vec<f32>, words: &mut Vec<u64>) {
-    let (width, height) = image.size();
-    let (ru, rv) = window.radii();
-    let stride = width + 2 * ru;
-    words.resize(width * height, 0);
-    smoothed.resize(stride * height, 0.0);
-    if words.is_empty() {
-        return;
+/// In rows of `stride` bytes of plane after plane.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Census {
+    smoothed: Vec<i16>,
+    bytes: Vec<u8>,
+    /// Planes of a row.
+    pub planes: usize,
+    /// Bytes from one plane of a row to the next.
+    pub stride: usize,
+    /// Whether the matching cost is half of the distance.
+    pub halve: bool,
+}
+
+impl Census {
+    /// The words of `image`, of the last column first if `mirrored`.
+    ///
+    /// The image is smoothed first (binomial, 3 × 3): that calms the noise of the order, and forgives
+    /// the fractions of a row by which rectification is wrong. Outside the image the nearest pixel counts.
+    pub fn compute(&mut self, image: &Image, window: CensusWindow, scale: f32, mirrored: bool) {
+        let (width, height) = image.size();
+        let (ru, rv) = window.radii();
+        let mut comparisons = window.comparisons();
+        if mirrored {
+            comparisons.iter_mut().flatten().for_each(|(i, _)| *i = 2 * ru - *i);
+        }
+        self.planes = comparisons.len().div_ceil(BITS);
+        self.stride = width.next_multiple_of(LANES);
+        let padded = self.stride + 2 * ru;
+        self.smoothed.resize(padded * height, 0);
+        self.bytes.resize(self.stride * self.planes * height, 0);
+        if self.bytes.is_empty() {
+            return;
+        }
+        self.halve = window.bits() > LARGEST_COST.into();
+        let Self { smoothed, bytes, planes, stride, .. } = self;
+        smoothed.par_chunks_mut(padded).enumerate().for_each_init(
+            || vec![0.0_f32; width],
+            |column, (v, row)| widest(Smooth { image, v, row, margin: ru, scale, mirrored, column }),
+        );
+        let row = |v: usize| &smoothed[v * padded..(v + 1) * padded];
+        bytes.par_chunks_mut(*stride * *planes).enumerate().for_each_init(Vec::new, |rows, (v, bytes)| {
+            rows.clear();
+            rows.extend((0..=2 * rv).map(|j| row((v + j).saturating_sub(rv).min(height - 1))));
+            widest(Compare { rows, comparisons: &comparisons, bytes, stride: *stride });
+        });
     }
-    smoothed.par_chunks_mut(stride).enumerate().for_each(|(v, row)| smooth_row(image, v, row, ru));
-    words.par_chunks_mut(width).enumerate().for_each(|(v, words)| {
-        let row = |v: usize| &smoothed[v * stride..(v + 1) * stride];
-        let centre = &row(v)[ru..ru + width];
-        // Two halves of 32 bits vectorise twice as wide as one word of 64.
-        let (mut high, mut low) = (vec![0_u32; width], vec![0_u32; width]);
-        for j in 0..=2 * rv {
-            let neighbours = row((v + j).saturating_sub(rv).min(height - 1));
-            for i in 0..=2 * ru {
-                match (j, i).cmp(&(rv, ru)) {
-                    Ordering::Less => push_bit(&mut high, &neighbours[i..i + width], centre),
-                    Ordering::Equal => {}
-                    Ordering::Greater => push_bit(&mut low, &neighbours[i..i + width], centre),
+
+    /// Plane after plane of row `v`.
+    pub fn row(&self, v: usize) -> &[u8] {
+        let size = self.stride * self.planes;
+        &self.bytes[v * size..(v + 1) * size]
+    }
+}
+
+/// The factor that spreads the grey levels of a pair over 15 bits: a power of two, so that whole
+/// grey levels stay exact.
+pub(super) fn grey_scale(images: [&Image; 2]) -> f32 {
+    let largest = |image: &Image| {
+        image.values().par_chunks(1 << 14).map(|part| widest(Largest(part))).reduce(|| 0.0, f32::max)
+    };
+    let largest = largest(images[0]).max(largest(images[1]));
+    if largest > 0.0 { (32_767.0 / largest).log2().floor().clamp(-100.0, 100.0).exp2() } else { 1.0 }
+}
+
+struct Largest<'a>(&'a [f32]);
+
+impl Kernel for Largest<'_> {
+    type Output = f32;
+    #[inline(always)]
+    fn run<B: Bytes>(self) -> f32 {
+        let mut most = [0.0_f32; LANES];
+        let (parts, rest) = self.0.as_chunks::<LANES>();
+        let size = |x: f32| if x.abs() < f32::INFINITY { x.abs() } else { 0.0 };
+        for part in parts {
+            for (most, &x) in most.iter_mut().zip(part) {
+                let x = size(x);
+                *most = if x > *most { x } else { *most };
+            }
+        }
+        most.iter().copied().chain(rest.iter().map(|&x| size(x))).fold(0.0, f32::max)
+    }
+}
+
+/// Row `v` smoothed by (1, 2, 1)/4 both ways, continued by `margin` and more copies of its ends.
+struct Smooth<'a> {
+    image: &'a Image,
+    v: usize,
+    row: &'a mut [i16],
+    margin: usize,
+    scale: f32,
+    mirrored: bool,
+    column: &'a mut [f32],
+}
+
+impl Kernel for Smooth<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<B: Bytes>(self) {
+        let Self { image, v, row, margin, scale, mirrored, column } = self;
+        let (width, height) = image.size();
+        let (above, here) = (image.row(v.saturating_sub(1)), image.row(v));
+        let below = image.row((v + 1).min(height - 1));
+        let scale = scale / 16.0;
+        for (((column, a), h), b) in column.iter_mut().zip(above).zip(here).zip(below) {
+            *column = (a + 2.0 * h + b) * scale;
+        }
+        let inner = &mut row[margin..margin + width];
+        for (smooth, three) in inner[1.min(width)..].iter_mut().zip(column.windows(3)) {
+            *smooth = whole(three[0] + 2.0 * three[1] + three[2]);
+        }
+        let last = width - 1;
+        inner[0] = whole(3.0 * column[0] + column[1.min(last)]);
+        inner[last] = whole(3.0 * column[last] + column[last.saturating_sub(1)]);
+        if mirrored {
+            inner.reverse();
+        }
+        let (first, last) = (inner[0], inner[last]);
+        row[..margin].fill(first);
+        row[margin + width..].fill(last);
+    }
+}
+
+/// The nearest whole number of what 16 bits hold; anything of anything else.
+///
+/// After this addition the last bits of the number are those of the whole number: a few operations
+/// on vectors, where a checked conversion takes many.
+#[inline(always)]
+fn whole(x: f32) -> i16 {
+    const LAST_BIT_IS_ONE: f32 = 12_582_912.0;
+    (x + LAST_BIT_IS_ONE).to_bits() as i16
+}
+
+/// The bytes of a row from the smoothed rows of its window.
+struct Compare<'a> {
+    rows: &'a [&'a [i16]],
+    comparisons: &'a [Comparison],
+    bytes: &'a mut [u8],
+    stride: usize,
+}
+
+impl Kernel for Compare<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<B: Bytes>(self) {
+        let planes = self.bytes.chunks_exact_mut(self.stride).zip(self.comparisons.as_chunks::<BITS>().0);
+        for (plane, comparisons) in planes {
+            let line = |(i, j): (usize, usize)| &self.rows[j][i..i + self.stride];
+            let lines = comparisons.map(|[a, b]| [line(a), line(b)]);
+            for (part, bytes) in plane.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+                let at = part * LANES..(part + 1) * LANES;
+                let mut bits = [0_i16; LANES];
+                for [a, b] in lines {
+                    for (bits, (a, b)) in bits.iter_mut().zip(a[at.clone()].iter().zip(&b[at.clone()])) {
+                        *bits = *bits << 1 | i16::from(a < b);
+                    }
+                }
+                for (byte, bits) in bytes.iter_mut().zip(bits) {
+                    *byte = bits as u8;
                 }
             }
         }
-        for (word, (high, low)) in words.iter_mut().zip(high.iter().zip(&low)) {
-            *word = u64::from(*high) << 32 | u64::from(*low);
-        }
-    });
-}
-
-/// Row `v` smoothed by (1, 2, 1)/4 both ways, continued by `margin` copies of its ends.
-fn smooth_row(image: &Image, v: usize, smoothed: &mut [f32], margin: usize) {
-    let (width, height) = image.size();
-    let (above, here) = (image.row(v.saturating_sub(1)), image.row(v));
-    let below = image.row((v + 1).min(height - 1));
-    let column: Vec<f32> = (0..width).map(|u| above[u] + 2.0 * here[u] + below[u]).collect();
-    for (i, value) in smoothed.iter_mut().enumerate() {
-        let u = i.saturating_sub(margin).min(width - 1);
-        *value = column[u.saturating_sub(1)] + 2.0 * column[u] + column[(u + 1).min(width - 1)];
-    }
-}
-
-/// Append to each word whether the neighbour is darker than the centre.
-fn push_bit(words: &mut [u32], neighbours: &[f32], centres: &[f32]) {
-    for ((word, n), c) in words.iter_mut().zip(neighbours).zip(centres) {
-        *word = *word << 1 | u32::from(n < c);
     }
 }
 
@@ -97,28 +237,58 @@ fn push_bit(words: &mut [u32], neighbours: &[f32], centres: &[f32]) {
 mod tests {
     use super::*;
 
+    const WINDOWS: [CensusWindow; 4] = [
+        CensusWindow::FiveByFive,
+        CensusWindow::SevenBySeven,
+        CensusWindow::NineBySeven,
+        CensusWindow::Symmetric,
+    ];
+
+    fn census(image: &Image, window: CensusWindow, mirrored: bool) -> Census {
+        let mut census = Census::default();
+        census.compute(image, window, grey_scale([image, image]), mirrored);
+        census
+    }
+
+    /// The bytes of the word of a pixel.
+    fn word(census: &Census, u: usize, v: usize) -> Vec<u8> {
+        (0..census.planes).map(|k| census.row(v)[k * census.stride + u]).collect()
+    }
+
     #[test]
     fn words_depend_on_order_alone() {
         let image = Image::from_fn(13, 11, |u, v| ((u * 37 + v * 101) % 53) as f32);
         let brighter = Image::from_fn(13, 11, |u, v| 7.0 + 300.0 * image.at(u, v));
-        for window in [CensusWindow::FiveByFive, CensusWindow::SevenBySeven, CensusWindow::NineBySeven] {
-            let (mut a, mut b) = (Vec::new(), Vec::new());
-            transform(&image, window, &mut Vec::new(), &mut a);
-            transform(&brighter, window, &mut Vec::new(), &mut b);
-            assert_eq!(a, b);
+        for window in WINDOWS {
+            let (a, b) = (census(&image, window, false), census(&brighter, window, false));
+            assert_eq!(a.bytes, b.bytes);
         }
     }
 
     #[test]
-    fn every_neighbour_has_its_bit() {
-        for window in [CensusWindow::FiveByFive, CensusWindow::SevenBySeven, CensusWindow::NineBySeven] {
-            let mut peak = Image::filled(15, 15, 1.0);
-            peak.set(7, 7, 2.0);
-            let mut words = Vec::new();
-            transform(&peak, window, &mut Vec::new(), &mut words);
-            assert_eq!(words[7 * 15 + 7].count_ones(), window.bits());
-            // Smoothing spreads the peak over 3 × 3 pixels; all others are nowhere brighter.
-            assert_eq!(words.iter().filter(|w| **w != 0).count(), 9);
+    fn every_comparison_has_its_bit() {
+        let mut peak = Image::filled(15, 15, 1.0);
+        peak.set(7, 7, 2.0);
+        for window in WINDOWS {
+            let census = census(&peak, window, false);
+            let bits = |u, v| word(&census, u, v).iter().map(|b| b.count_ones()).sum::<u32>();
+            // Smoothing spreads the peak over 3 × 3 pixels; all others are nowhere brighter. Of pixels
+            // opposite of the middle none differ.
+            let expected = if window == CensusWindow::Symmetric { 0 } else { window.bits() };
+            assert_eq!(bits(7, 7), expected);
+            let set = (0..225).filter(|i| bits(i % 15, i / 15) > 0).count();
+            assert_eq!(set, if window == CensusWindow::Symmetric { set } else { 9 });
+        }
+    }
+
+    #[test]
+    fn a_mirrored_image_has_the_same_words_in_turn() {
+        let image = Image::from_fn(40, 9, |u, v| ((u * 29 + v * 83) % 47) as f32);
+        for window in WINDOWS {
+            let (plain, mirrored) = (census(&image, window, false), census(&image, window, true));
+            for (u, v) in (0..360).map(|i| (i % 40, i / 40)) {
+                assert_eq!(word(&plain, u, v), word(&mirrored, 39 - u, v));
+            }
         }
     }
 }

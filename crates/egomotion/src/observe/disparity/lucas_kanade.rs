@@ -3,100 +3,151 @@
 //! B. Lucas, T. Kanade, IJCAI 1981, in one dimension. The variance of the step is that of the grey
 //! levels' difference, taken from the residual, over the sum of the squared slopes.
 
-/// Windows summed side by side.
-pub(super) const LANES: usize = 8;
+use super::lanes::{Bytes, Kernel};
+use super::surface::RADIUS;
+
 /// Weight of the whole image's noise against a window's own, in pixels of the window.
 const NOISE_PRIOR_PIXELS: f32 = 8.0;
-
-/// Pixels of the same surface below which a window says nothing.
+/// Pixels below which a window says nothing.
 const FEWEST_PIXELS: f32 = 6.0;
 /// Least noise variance against the variance of the slopes: what f32 sums can tell from nothing.
 const LEAST_NOISE: f32 = 1e-6;
+/// Sums of a window: of its weights, slopes g, differences e and their products.
+const SUMS: usize = 6;
 
-/// A pixel of a window.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct WindowPixel {
-    /// Its index in a plane less the index of the window's centre.
-    pub offset: isize,
-    /// Greatest difference of disparity from the centre's on the same surface, in pixels.
-    pub tolerance: f32,
+/// A row of weights, slopes and differences of grey levels, from RADIUS.0 pixels left of the image
+/// on, in `row_length` pixels.
+#[derive(Clone, Copy)]
+pub(super) struct Differences<'a> {
+    /// 1 where a difference is known, else 0 like the others.
+    pub weight: &'a [f32],
+    /// Derivative of the difference by the disparity.
+    pub slope: &'a [f32],
+    /// Left minus right grey level.
+    pub difference: &'a [f32],
 }
 
-/// The eight values from `start` on.
-pub(super) fn lanes(plane: &[f32], start: usize) -> [f32; LANES] {
-    let values = &plane[start..start + LANES];
-    std::array::from_fn(|lane| values[lane])
-}
-
-/// Sums over eight windows: of the pixels of the same surface, their slopes g, differences e and products.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Sums {
-    count: [f32; LANES],
-    g: [f32; LANES],
-    e: [f32; LANES],
-    gg: [f32; LANES],
-    ge: [f32; LANES],
-    ee: [f32; LANES],
-}
-
-/// What the grey levels of a window say of its disparity.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Fit {
+/// What the grey levels of the windows of a row say of their disparity.
+pub(super) struct Fit<'a> {
     /// Correction of the disparity, in pixels, times `information`.
-    pub pull: f32,
+    pub pull: &'a mut [f32],
     /// Inverse variance of the correction, px⁻².
-    pub information: f32,
+    pub information: &'a mut [f32],
     /// Noise variance of the difference of two grey levels; NaN if the window has too few pixels.
-    pub noise: f32,
+    pub noise: &'a mut [f32],
 }
 
-impl Sums {
-    /// Gather the sums of the eight windows whose centres begin at index `at`.
-    pub(super) fn gather(
-        window: &[WindowPixel],
-        at: usize,
-        disparity: &[f32],
-        difference: &[f32],
-        slope: &[f32],
-    ) -> Self {
-        let mut sums = Self::default();
-        let centre = lanes(disparity, at);
-        for &WindowPixel { offset, tolerance } in window {
-            let at = at.wrapping_add_signed(offset);
-            let (near, e, g) = (lanes(disparity, at), lanes(difference, at), lanes(slope, at));
-            for lane in 0..LANES {
-                let weight = if (near[lane] - centre[lane]).abs() <= tolerance { 1.0 } else { 0.0 };
-                let (wg, we) = (weight * g[lane], weight * e[lane]);
-                sums.count[lane] += weight;
-                sums.g[lane] += wg;
-                sums.e[lane] += we;
-                sums.gg[lane] += wg * g[lane];
-                sums.ge[lane] += wg * e[lane];
-                sums.ee[lane] += we * e[lane];
-            }
-        }
-        sums
-    }
+/// Columns solved at a time: what they need stays in the fastest cache.
+const TILE: usize = 128;
+/// Pixels of a row with the margins that windows need.
+pub(super) fn row_length(width: usize) -> usize {
+    width.next_multiple_of(TILE) + 2 * RADIUS.0
+}
 
-    /// Least squares of e = offset − g δ, whose offset takes up a difference of brightness.
-    pub(super) fn fit(&self, lane: usize, typical_noise: Option<f32>) -> Fit {
-        let n = self.count[lane];
-        if n < FEWEST_PIXELS {
-            return Fit { pull: 0.0, information: 0.0, noise: f32::NAN };
+/// Columns of a tile's windows.
+const WIDE: usize = TILE + 2 * RADIUS.0;
+
+/// Least squares of e = offset − g δ over each window of a row, whose offset takes up a difference
+/// of brightness.
+pub(super) struct FitRow<'a, 'b> {
+    /// The rows of the window.
+    pub rows: &'b [Differences<'a>],
+    /// Median noise of the image.
+    pub typical_noise: Option<f32>,
+    pub fit: Fit<'b>,
+}
+
+impl Kernel for FitRow<'_, '_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<B: Bytes>(self) {
+        let Self { rows, typical_noise, fit } = self;
+        let tiles =
+            (fit.pull.chunks_mut(TILE)).zip(fit.information.chunks_mut(TILE)).zip(fit.noise.chunks_mut(TILE));
+        for (tile, ((pull, information), noise)) in tiles.enumerate() {
+            let sums = across(&down(rows, tile * TILE));
+            solve(&sums, typical_noise, pull, information, noise);
         }
-        let gg = (self.gg[lane] - self.g[lane] * self.g[lane] / n).max(0.0);
-        let ge = self.ge[lane] - self.g[lane] * self.e[lane] / n;
-        let ee = (self.ee[lane] - self.e[lane] * self.e[lane] / n).max(0.0);
-        let residual = (ee - if gg > 0.0 { ge * ge / gg } else { 0.0 }).max(0.0);
-        let own = residual / (n - 2.0);
-        let noise = match typical_noise {
-            Some(typical) => (residual + NOISE_PRIOR_PIXELS * typical) / (n - 2.0 + NOISE_PRIOR_PIXELS),
-            None => own,
-        }
-        .max(LEAST_NOISE * gg / n);
-        // Noise makes slopes of its own, ¼ of the variance of the difference: they are no texture.
-        let texture = (gg - 0.25 * n * noise).max(0.0);
-        let scale = if texture > 0.0 { texture / (gg * noise) } else { 0.0 };
-        Fit { pull: -ge * scale, information: gg * scale, noise: own }
     }
+}
+
+/// Sums over the rows, of the columns from `first` on.
+#[inline(always)]
+fn down<'a>(rows: &[Differences<'a>], first: usize) -> [[f32; WIDE]; SUMS] {
+    let mut sums = [[0.0; WIDE]; SUMS];
+    let [n, g, e, gg, ge, ee] = &mut sums;
+    for row in rows {
+        let piece = |line: &'a [f32]| line[first..].first_chunk::<WIDE>();
+        let pieces = (piece(row.weight), piece(row.slope), piece(row.difference));
+        let (Some(w), Some(s), Some(d)) = pieces else { continue };
+        for i in 0..WIDE {
+            n[i] += w[i];
+            g[i] += s[i];
+            e[i] += d[i];
+            gg[i] += s[i] * s[i];
+            ge[i] += s[i] * d[i];
+            ee[i] += d[i] * d[i];
+        }
+    }
+    sums
+}
+
+/// Sums over the nine columns from each on.
+#[inline(always)]
+fn across(columns: &[[f32; WIDE]; SUMS]) -> [[f32; TILE]; SUMS] {
+    const { assert!(RADIUS.0 == 4) };
+    let mut sums = [[0.0; TILE]; SUMS];
+    for (sum, line) in sums.iter_mut().zip(columns) {
+        let mut three = [0.0; TILE + 6];
+        for i in 0..TILE + 6 {
+            three[i] = line[i] + line[i + 1] + line[i + 2];
+        }
+        for i in 0..TILE {
+            sum[i] = three[i] + three[i + 3] + three[i + 6];
+        }
+    }
+    sums
+}
+
+/// The least squares of each window.
+#[inline(always)]
+fn solve(
+    sums: &[[f32; TILE]; SUMS],
+    typical_noise: Option<f32>,
+    pull: &mut [f32],
+    information: &mut [f32],
+    noise: &mut [f32],
+) {
+    let (prior_pixels, prior_noise) = match typical_noise {
+        Some(typical) => (NOISE_PRIOR_PIXELS, NOISE_PRIOR_PIXELS * typical),
+        None => (0.0, 0.0),
+    };
+    let mut answers = [[0.0; TILE]; 3];
+    let [pulls, informations, noises] = &mut answers;
+    let [n, g, e, gg, ge, ee] = sums;
+    for i in 0..TILE {
+        let n = n[i];
+        let per_pixel = 1.0 / if n > 1.0 { n } else { 1.0 };
+        let positive = |x: f32| if x > 0.0 { x } else { 0.0 };
+        let gg = positive(gg[i] - g[i] * g[i] * per_pixel);
+        let ge = ge[i] - g[i] * e[i] * per_pixel;
+        let ee = positive(ee[i] - e[i] * e[i] * per_pixel);
+        let per_gg = if gg > 0.0 { 1.0 / gg } else { 0.0 };
+        let residual = positive(ee - ge * ge * per_gg);
+        let degrees = if n > 3.0 { n - 2.0 } else { 1.0 };
+        let least = LEAST_NOISE * gg * per_pixel;
+        let mean = (residual + prior_noise) / (degrees + prior_pixels);
+        let noise = if mean > least { mean } else { least };
+        // Noise makes slopes of its own, ¼ of the variance of the difference: they are no texture.
+        let texture = positive(gg - 0.25 * n * noise);
+        let enough = n >= FEWEST_PIXELS;
+        let scale = if enough && texture > 0.0 { texture * per_gg / noise } else { 0.0 };
+        pulls[i] = -ge * scale;
+        informations[i] = gg * scale;
+        noises[i] = if enough { residual / degrees } else { f32::NAN };
+    }
+    let count = pull.len();
+    pull.copy_from_slice(&pulls[..count]);
+    information.copy_from_slice(&informations[..count]);
+    noise.copy_from_slice(&noises[..count]);
 }

@@ -1,15 +1,22 @@
 //! Dense disparity of a rectified pair, with its standard deviation.
 //!
-//! Four steps: census words of both images, semi-global matching, checks that decide which winners
-//! to believe, and photometric sub-pixel refinement. Pixels without a believed match, such as
-//! those hidden from one camera, stay missing: nothing is filled in.
+//! Five steps: census words of both images, semi-global matching, checks that decide which winners
+//! to believe, photometric sub-pixel refinement, and holes filled from either side. What is filled
+//! in has a standard deviation of [`GUESS_SIGMA_PX`] and more; wide holes stay missing.
 
 mod census;
 mod check;
+mod fill;
+mod lanes;
 mod lucas_kanade;
+mod rows;
 mod semi_global;
+mod speckles;
 mod subpixel;
+mod surface;
+mod sweep;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use census::CensusWindow;
@@ -40,6 +47,8 @@ pub struct DisparityOptions {
     pub speckle_size: usize,
     /// Difference of disparity that still connects neighbours, in pixels.
     pub speckle_range: f32,
+    /// Whether gaps no wider than `levels` are filled along the row, with a large standard deviation.
+    pub fill: bool,
     /// Steps of sub-pixel refinement, at least 1.
     pub refinement_steps: usize,
 }
@@ -49,18 +58,26 @@ impl Default for DisparityOptions {
         Self {
             levels: 128,
             census: CensusWindow::default(),
-            penalty_small: 20,
-            penalty_large: 190,
-            penalty_large_least: 50,
+            penalty_small: 10,
+            penalty_large: 54,
+            penalty_large_least: 24,
             edge_contrast: 4.0,
             uniqueness: 0.01,
             left_right_tolerance: 2,
             speckle_size: 100,
             speckle_range: 1.0,
-            refinement_steps: 3,
+            fill: true,
+            refinement_steps: 2,
         }
     }
 }
+
+/// Standard deviation from which on a disparity is a guess and no measurement, in pixels: all that
+/// is filled in, and where grey levels contradict the matching.
+///
+/// Such values tell where surfaces are; motion is not to be estimated from them, for their errors
+/// are systematic: an occluded pixel keeps its side of the object.
+pub const GUESS_SIGMA_PX: f32 = 1.0;
 
 /// Disparity of the left image's pixels.
 #[derive(Debug, Clone, PartialEq)]
@@ -101,12 +118,11 @@ pub enum DisparityError {
 #[derive(Debug, Clone, Default)]
 pub struct DisparityMatcher {
     options: DisparityOptions,
-    smoothed: Vec<f32>,
-    left_words: Vec<u64>,
-    right_words: Vec<u64>,
+    left_words: census::Census,
+    right_words: census::Census,
     semi_global: semi_global::SemiGlobal,
     winners: Vec<f32>,
-    speckles: check::Speckles,
+    speckles: speckles::Speckles,
     refinement: subpixel::Refinement,
 }
 
@@ -137,20 +153,24 @@ impl DisparityMatcher {
             return Ok(map);
         }
         let options = &self.options;
-        census::transform(left, options.census, &mut self.smoothed, &mut self.left_words);
-        census::transform(right, options.census, &mut self.smoothed, &mut self.right_words);
+        let scale = census::grey_scale([left, right]);
+        self.left_words.compute(left, options.census, scale, false);
+        self.right_words.compute(right, options.census, scale, true);
         self.winners.resize(width * height, f32::NAN);
         let pair =
             semi_global::Pair { left, left_words: &self.left_words, right_words: &self.right_words, levels };
         self.semi_global.winners(&pair, options, &mut self.winners);
         let (size, range) = (options.speckle_size, options.speckle_range);
-        check::remove_speckles(&mut self.winners, width, size, range, &mut self.speckles);
+        self.speckles.remove(&mut self.winners, width, size, range);
         self.refinement.refine(left, right, &self.winners, options.refinement_steps.max(1));
-        for v in 0..height {
-            let (shift, sigma) = self.refinement.row(v);
-            map.shift.row_mut(v).copy_from_slice(shift);
-            map.sigma.row_mut(v).copy_from_slice(sigma);
-        }
+        let rows = (map.shift.rows_mut()).zip(map.sigma.rows_mut());
+        rows.zip(self.refinement.rows()).for_each(|((to_shift, to_sigma), (shift, sigma))| {
+            to_shift.copy_from_slice(shift);
+            to_sigma.copy_from_slice(sigma);
+            if options.fill {
+                fill::fill_row(to_shift, to_sigma, levels);
+            }
+        });
         Ok(map)
     }
 }

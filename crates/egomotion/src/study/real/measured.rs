@@ -49,7 +49,9 @@ impl Measured {
     /// # Errors
     /// [`Unmeasured`] when the images differ in size.
     pub fn new(frames: &[StereoImages; 3], rig: &StereoRig, levels: f32) -> Result<Self, Unmeasured> {
-        let mut matcher = DisparityMatcher::new(DisparityOptions::default());
+        // Gradients and differences are taken of what is measured, not of what is filled in.
+        let mut matcher =
+            DisparityMatcher::new(DisparityOptions { fill: false, ..DisparityOptions::default() });
         let [a, b, c] = frames;
         let mut shift = |pair: &StereoImages| matcher.compute(&pair.left, &pair.right);
         let disparity = [shift(a)?, shift(b)?, shift(c)?];

@@ -1,0 +1,97 @@
+//! Holes filled from either side along the row, with a standard deviation that says so.
+//!
+//! What one camera alone sees lies behind what hides it: a gap between two surfaces belongs to the
+//! farther one. Along a slanted surface the gap is bridged. The standard deviations are what such
+//! guesses err by (the middle 68 %) on Middlebury and KITTI pairs; their tails are long.
+
+/// Slope of disparity along a row, px per px, up to which the ends of a gap are one surface.
+const ONE_SURFACE_SLOPE: f32 = 0.2;
+/// Difference of the ends of a gap that is one surface whatever its width, in pixels.
+const ONE_SURFACE_STEP: f32 = 1.0;
+/// Standard deviation of a bridge, in pixels, and what it grows by with the difference of its ends.
+const BRIDGE_SIGMA: f32 = 1.0;
+const BRIDGE_SIGMA_PER_STEP: f32 = 0.4;
+/// Standard deviation of the farther end, in pixels.
+const FARTHER_SIGMA: f32 = 2.0;
+/// Growth of the standard deviation with the distance from the end, where a gap has one end only.
+const SIGMA_PER_PIXEL: f32 = 0.03;
+
+/// Fill the gaps of a row (NaN) that are no wider than `widest`.
+///
+/// A gap that occlusion explains is not wider than the range of disparity; beyond that nothing is known.
+pub(super) fn fill_row(shift: &mut [f32], sigma: &mut [f32], widest: usize) {
+    let mut start = 0;
+    while let Some(gap) = next_gap(shift, start) {
+        start = gap.end;
+        if gap.len() > widest {
+            continue;
+        }
+        let end = |u: Option<usize>| u.and_then(|u| Some((*shift.get(u)?, *sigma.get(u)?)));
+        let (before, after) = (end(gap.start.checked_sub(1)), end(Some(gap.end)));
+        for u in gap.clone() {
+            let (value, spread) = match (before, after) {
+                (Some(a), Some(b)) => {
+                    between(a, b, (u + 1 - gap.start) as f32 / (gap.len() + 1) as f32, gap.len())
+                }
+                (Some(a), None) => beyond(a, (u + 1 - gap.start) as f32),
+                (None, Some(b)) => beyond(b, (gap.end - u) as f32),
+                (None, None) => continue,
+            };
+            (shift[u], sigma[u]) = (value, spread);
+        }
+    }
+}
+
+/// The next pixels without a value, from `start` on.
+fn next_gap(shift: &[f32], start: usize) -> Option<std::ops::Range<usize>> {
+    let first = start + shift.get(start..)?.iter().position(|d| d.is_nan())?;
+    let length = shift[first..].iter().position(|d| !d.is_nan()).unwrap_or(shift.len() - first);
+    Some(first..first + length)
+}
+
+/// Value and standard deviation at the fraction `t` of a gap of `length` pixels between two pixels.
+fn between(a: (f32, f32), b: (f32, f32), t: f32, length: usize) -> (f32, f32) {
+    let step = (b.0 - a.0).abs();
+    if step <= ONE_SURFACE_STEP.max(ONE_SURFACE_SLOPE * (length + 1) as f32) {
+        let ends = a.1.max(b.1);
+        (a.0 + t * (b.0 - a.0), ends.hypot(BRIDGE_SIGMA.hypot(BRIDGE_SIGMA_PER_STEP * step)))
+    } else {
+        let farther = if a.0 < b.0 { a } else { b };
+        (farther.0, farther.1.hypot(FARTHER_SIGMA))
+    }
+}
+
+/// Value and standard deviation `distance` pixels beyond the last pixel known.
+fn beyond(end: (f32, f32), distance: f32) -> (f32, f32) {
+    (end.0, end.1.hypot(BRIDGE_SIGMA.hypot(SIGMA_PER_PIXEL * distance)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NONE: f32 = f32::NAN;
+
+    fn filled(row: &[f32], widest: usize) -> (Vec<f32>, Vec<f32>) {
+        let mut shift = row.to_vec();
+        let mut sigma: Vec<f32> = row.iter().map(|d| if d.is_nan() { NONE } else { 0.1 }).collect();
+        fill_row(&mut shift, &mut sigma, widest);
+        (shift, sigma)
+    }
+
+    #[test]
+    fn a_gap_in_a_surface_is_bridged_and_an_occlusion_is_behind() {
+        let (shift, sigma) = filled(&[4.0, NONE, 4.5, 4.5, NONE, NONE, 12.0, NONE], 4);
+        assert_eq!(shift, [4.0, 4.25, 4.5, 4.5, 4.5, 4.5, 12.0, 12.0]);
+        assert!(sigma[1] >= 1.0 && sigma[4] >= 2.0 && sigma[7] >= 1.0 && sigma[3] == 0.1);
+    }
+
+    #[test]
+    fn wide_gaps_and_empty_rows_stay_missing() {
+        let (shift, _) = filled(&[NONE, NONE, NONE, 5.0, NONE, 5.0], 2);
+        assert_eq!(shift[..3].iter().filter(|d| d.is_nan()).count(), 3);
+        assert_eq!(shift[3..], [5.0, 5.0, 5.0]);
+        assert!(filled(&[NONE; 4], 9).0.iter().all(|d| d.is_nan()));
+        assert!(filled(&[], 9).0.is_empty());
+    }
+}

@@ -1,0 +1,258 @@
+//! Bytes side by side, and kernels compiled for the widest vectors of the processor.
+//!
+//! A kernel is written once over [`Bytes`] and runs on 256-bit registers where the processor has
+//! AVX2, on arrays everywhere else. Both compute the same integers.
+
+/// Bytes in a vector.
+pub(super) const LANES: usize = 32;
+
+/// So many bytes, on which one operation acts at once.
+pub(super) trait Bytes: Copy {
+    /// The same byte everywhere.
+    fn splat(value: u8) -> Self;
+    /// From an array.
+    fn from_array(bytes: [u8; LANES]) -> Self;
+    /// As an array.
+    fn to_array(self) -> [u8; LANES];
+    /// The lesser of each two.
+    fn min(self, other: Self) -> Self;
+    /// Sum, 255 at most.
+    fn plus(self, other: Self) -> Self;
+    /// Difference, 0 at least.
+    fn minus(self, other: Self) -> Self;
+    /// Number of bits in which each byte differs from that of `other`.
+    fn distance(self, other: Self) -> Self;
+    /// Larger of each two.
+    fn max(self, other: Self) -> Self;
+    /// The least byte, everywhere.
+    fn least(self) -> Self;
+    /// Bit i is set if byte i is that of `other` or less.
+    fn at_most(self, other: Self) -> u32;
+    /// Each byte moved up by one; the last of `before` becomes the first.
+    fn moved_up(self, before: Self) -> Self;
+    /// Each byte moved down by one; the first of `after` becomes the last.
+    fn moved_down(self, after: Self) -> Self;
+    /// Half of each byte, rounded down.
+    fn halved(self) -> Self;
+
+    /// The bytes from `start` on.
+    #[inline(always)]
+    fn load(bytes: &[u8], start: usize) -> Self {
+        let mut lanes = [0; LANES];
+        lanes.copy_from_slice(&bytes[start..start + LANES]);
+        Self::from_array(lanes)
+    }
+
+    /// Write to the bytes from `start` on.
+    #[inline(always)]
+    fn store(self, bytes: &mut [u8], start: usize) {
+        bytes[start..start + LANES].copy_from_slice(&self.to_array());
+    }
+}
+
+/// The plain version: an array.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Array([u8; LANES]);
+
+impl Array {
+    #[inline(always)]
+    fn with(mut self, other: Self, f: impl Fn(u8, u8) -> u8) -> Self {
+        for (a, b) in self.0.iter_mut().zip(other.0) {
+            *a = f(*a, b);
+        }
+        self
+    }
+}
+
+impl Bytes for Array {
+    #[inline(always)]
+    fn splat(value: u8) -> Self {
+        Self([value; LANES])
+    }
+    #[inline(always)]
+    fn from_array(bytes: [u8; LANES]) -> Self {
+        Self(bytes)
+    }
+    #[inline(always)]
+    fn to_array(self) -> [u8; LANES] {
+        self.0
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.with(other, u8::min)
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.with(other, u8::max)
+    }
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        self.with(other, u8::saturating_add)
+    }
+    #[inline(always)]
+    fn minus(self, other: Self) -> Self {
+        self.with(other, u8::saturating_sub)
+    }
+    #[inline(always)]
+    fn distance(self, other: Self) -> Self {
+        self.with(other, |a, b| (a ^ b).count_ones() as u8)
+    }
+    #[inline(always)]
+    fn least(self) -> Self {
+        Self::splat(self.0.into_iter().fold(u8::MAX, u8::min))
+    }
+    #[inline(always)]
+    fn at_most(self, other: Self) -> u32 {
+        self.0.iter().zip(&other.0).enumerate().fold(0, |bits, (i, (a, b))| bits | u32::from(a <= b) << i)
+    }
+    #[inline(always)]
+    fn moved_up(self, before: Self) -> Self {
+        let mut moved = [before.0[LANES - 1]; LANES];
+        moved[1..].copy_from_slice(&self.0[..LANES - 1]);
+        Self(moved)
+    }
+    #[inline(always)]
+    fn moved_down(self, after: Self) -> Self {
+        let mut moved = [after.0[0]; LANES];
+        moved[..LANES - 1].copy_from_slice(&self.0[1..]);
+        Self(moved)
+    }
+    #[inline(always)]
+    fn halved(self) -> Self {
+        self.with(self, |a, _| a >> 1)
+    }
+}
+
+/// The version for AVX2: a register.
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    #![allow(unsafe_code, reason = "registers make a frame five times as fast; see `widest`")]
+
+    use std::arch::x86_64::*;
+
+    use super::{Bytes, LANES};
+
+    /// 32 bytes in a register. Only [`super::widest`] names it, after asking for AVX2.
+    #[derive(Debug, Clone, Copy)]
+    pub(super) struct Register(__m256i);
+
+    // SAFETY, of all that follows: the processor has AVX2, because `widest` has asked; arrays of 32
+    // bytes and the register are of one size, and every pattern of bits is a value of either.
+    impl Bytes for Register {
+        #[inline(always)]
+        fn splat(value: u8) -> Self {
+            Self(unsafe { _mm256_set1_epi8(value as i8) })
+        }
+        #[inline(always)]
+        fn from_array(bytes: [u8; LANES]) -> Self {
+            Self(unsafe { std::mem::transmute::<[u8; LANES], __m256i>(bytes) })
+        }
+        #[inline(always)]
+        fn to_array(self) -> [u8; LANES] {
+            unsafe { std::mem::transmute::<__m256i, [u8; LANES]>(self.0) }
+        }
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            Self(unsafe { _mm256_min_epu8(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            Self(unsafe { _mm256_max_epu8(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn plus(self, other: Self) -> Self {
+            Self(unsafe { _mm256_adds_epu8(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn minus(self, other: Self) -> Self {
+            Self(unsafe { _mm256_subs_epu8(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn distance(self, other: Self) -> Self {
+            // The bits of each half byte, looked up.
+            const COUNTS: [u8; LANES] = {
+                let mut counts = [0; LANES];
+                let mut i = 0;
+                while i < LANES {
+                    counts[i] = (i % 16).count_ones() as u8;
+                    i += 1;
+                }
+                counts
+            };
+            let counts = Self::from_array(COUNTS).0;
+            unsafe {
+                let nibble = _mm256_set1_epi8(15);
+                let bits = _mm256_xor_si256(self.0, other.0);
+                let low = _mm256_shuffle_epi8(counts, _mm256_and_si256(bits, nibble));
+                let high = _mm256_and_si256(_mm256_srli_epi16::<4>(bits), nibble);
+                Self(_mm256_add_epi8(low, _mm256_shuffle_epi8(counts, high)))
+            }
+        }
+        #[inline(always)]
+        fn least(self) -> Self {
+            unsafe {
+                let half =
+                    _mm_min_epu8(_mm256_castsi256_si128(self.0), _mm256_extracti128_si256::<1>(self.0));
+                // The least of each two bytes as 16 bits, of which one instruction finds the least.
+                let pairs = _mm_min_epu8(half, _mm_srli_epi16::<8>(half));
+                Self(_mm256_broadcastb_epi8(_mm_minpos_epu16(pairs)))
+            }
+        }
+        #[inline(always)]
+        fn at_most(self, other: Self) -> u32 {
+            let lesser = self.min(other).0;
+            unsafe { _mm256_movemask_epi8(_mm256_cmpeq_epi8(self.0, lesser)) as u32 }
+        }
+        #[inline(always)]
+        fn moved_up(self, before: Self) -> Self {
+            unsafe {
+                // (high half of `before`, low half of self)
+                let middle = _mm256_permute2x128_si256::<0x21>(before.0, self.0);
+                Self(_mm256_alignr_epi8::<15>(self.0, middle))
+            }
+        }
+        #[inline(always)]
+        fn moved_down(self, after: Self) -> Self {
+            unsafe {
+                // (high half of self, low half of `after`)
+                let middle = _mm256_permute2x128_si256::<0x21>(self.0, after.0);
+                Self(_mm256_alignr_epi8::<1>(middle, self.0))
+            }
+        }
+        #[inline(always)]
+        fn halved(self) -> Self {
+            unsafe { Self(_mm256_and_si256(_mm256_srli_epi16::<1>(self.0), _mm256_set1_epi8(127))) }
+        }
+    }
+}
+
+/// A loop worth compiling for wide vectors.
+///
+/// `run` and all that it calls in its loop must be `#[inline(always)]`: only then is it compiled
+/// anew, with the instructions of the processor it runs on. Integers give the same answer with any
+/// instructions, and so do floating-point numbers, of which Rust fuses and reorders nothing.
+pub(super) trait Kernel {
+    /// What it answers.
+    type Output;
+    /// The loop, on vectors of this kind.
+    fn run<B: Bytes>(self) -> Self::Output;
+}
+
+/// Run a kernel with the widest vectors of this processor.
+pub(super) fn widest<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2")
+        && std::arch::is_x86_feature_detected!("bmi1")
+        && std::arch::is_x86_feature_detected!("popcnt")
+    {
+        // Of the three no processor with AVX2 lacks any.
+        #[target_feature(enable = "avx2,bmi1,popcnt")]
+        fn wide<K: Kernel>(kernel: K) -> K::Output {
+            kernel.run::<avx2::Register>()
+        }
+        #[allow(unsafe_code, reason = "the lines above ask whether the processor has the instructions")]
+        // SAFETY: it has them.
+        return unsafe { wide(kernel) };
+    }
+    kernel.run::<Array>()
+}
