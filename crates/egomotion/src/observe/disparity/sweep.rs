@@ -207,8 +207,8 @@ impl<const BLOCKS: usize> Kernel for Back<'_, BLOCKS> {
                 least = least.min(totals[block]);
             }
             let least_along = least_along.least();
-            for block in 0..BLOCKS {
-                leftward.0[block] = along[block].minus(least_along);
+            for (path, along) in leftward.0.iter_mut().zip(along) {
+                *path = along.minus(least_along);
             }
             let least = least.least();
             let least_cost = least.to_array()[0];
