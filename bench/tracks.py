@@ -13,6 +13,7 @@ import numpy as np
 
 FRAMES = 11
 THREADS = 2
+CORNERS = 2000
 LK = dict(winSize=(21, 21), maxLevel=3)
 
 
@@ -51,25 +52,27 @@ def main():
     read = lambda side, k: cv2.imread(os.path.join(folder, f"image_{side}/{k:06d}.png"), cv2.IMREAD_GRAYSCALE)
     frames = [(read(0, k), read(1, k)) for k in range(FRAMES)]
     environment = dict(os.environ, RAYON_NUM_THREADS=str(THREADS))
-    # So many cells and corners that about 2000 of each are followed in time.
-    cells, wanted = 4000, 2000
-    mine, theirs = [], []
+    theirs, mine = [], {1200: [], 3000: [], 7000: []}
     for _ in range(rounds):
-        line = subprocess.run([ours, folder, str(FRAMES), str(cells)], env=environment, check=True, capture_output=True, text=True)
-        mine.append([float(x) for x in line.stdout.split()])
-        times, survived = opencv(frames, wanted)
+        for cells, found in mine.items():
+            command = [ours, folder, str(FRAMES), str(cells)]
+            line = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+            found.append([float(x) for x in line.stdout.split()])
+        times, survived = opencv(frames, CORNERS)
         theirs.append([survived, *times.min(0), *np.median(times, 0)])
-    mine, theirs = np.array(mine), np.array(theirs)
-    count, build, _, track, _ = mine.min(0)
-    _, _, build_median, _, track_median = np.median(mine, 0)
-    survived, flow, four = theirs.min(0)[:3]
+    survived, flow, four = np.min(theirs, 0)[:3]
     flow_median, four_median = np.median(theirs, 0)[3:]
-    print(f"load {os.getloadavg()[0]:.1f}; {FRAMES - 1} pairs, {rounds} rounds, {THREADS} threads; ms a pair, least (median)")
-    print(f"egomotion  {count:.0f} four-way tracks: pyramids {build:.1f} ({build_median:.1f}), corners and tracks {track:.1f} ({track_median:.1f})")
-    print(f"OpenCV     corners, LK there and back: {flow:.1f} ({flow_median:.1f}); four-way {four:.1f} ({four_median:.1f}), {survived:.0f} tracks")
-    ratio = lambda a, b: f"{a / b:.2f}"
-    print(f"ratio      to OpenCV's way there and back in time alone {ratio(build + track, flow)} ({ratio(build_median + track_median, flow_median)}),"
-          f" to its four-way {ratio(build + track, four)} ({ratio(build_median + track_median, four_median)})")
+    print(f"load {os.getloadavg()[0]:.1f}; {FRAMES} frames, {rounds} rounds, {THREADS} threads; ms a pair, least (median)")
+    print(f"OpenCV     {CORNERS} corners, LK there and back in time: {flow:.1f} ({flow_median:.1f});"
+          f" four-way {four:.1f} ({four_median:.1f}), {survived:.0f} tracks left")
+    for cells, found in mine.items():
+        count, build, _, track, _ = np.min(found, 0)
+        _, _, build_median, _, track_median = np.median(found, 0)
+        least, median = build + track, build_median + track_median
+        print(f"egomotion  {cells} cells: {count:.0f} four-way tracks left; pyramids {build:.1f} ({build_median:.1f}),"
+              f" corners and tracks {track:.1f} ({track_median:.1f})")
+        print(f"           ratio to there and back {least / flow:.2f} ({median / flow_median:.2f}),"
+              f" to four-way {least / four:.2f} ({median / four_median:.2f})")
 
 
 if __name__ == "__main__":
