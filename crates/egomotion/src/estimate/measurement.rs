@@ -48,17 +48,23 @@ pub(super) fn product<const N: usize, const K: usize, const M: usize>(
     SMatrix::from_data(nalgebra::ArrayStorage(out))
 }
 
-/// S⁻¹ by cofactors; `None` unless S is positive definite, which rounding or a careless caller may break.
+/// S⁻¹ by S = L D Lᵀ; `None` unless S is positive definite, which rounding or a careless caller may break.
+///
+/// Where one quantity is known far better than another, cofactors would lose it in rounding.
 fn inverse(s: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    let [a, b, c] =
-        [s.m22 * s.m33 - s.m23 * s.m23, s.m13 * s.m23 - s.m12 * s.m33, s.m12 * s.m23 - s.m13 * s.m22];
-    let determinant = s.m11 * a + s.m12 * b + s.m13 * c;
-    let minor = s.m11 * s.m22 - s.m12 * s.m12;
-    if !(s.m11 > 0.0 && minor > 0.0 && determinant > 0.0 && determinant.is_finite()) {
+    let (l21, l31) = (s.m12 / s.m11, s.m13 / s.m11);
+    let d2 = s.m22 - l21 * s.m12;
+    let rest = s.m23 - l31 * s.m12;
+    let l32 = rest / d2;
+    let d3 = s.m33 - l31 * s.m13 - l32 * rest;
+    if !(s.m11 > 0.0 && d2 > 0.0 && d3 > 0.0) {
         return None;
     }
-    let (d, e) = (s.m11 * s.m33 - s.m13 * s.m13, s.m12 * s.m13 - s.m11 * s.m23);
-    Some(Matrix3::new(a, b, c, b, d, e, c, e, minor) / determinant)
+    // L⁻¹ has the rows (1), (a, 1), (c, b, 1).
+    let (a, b, c) = (-l21, -l32, l21 * l32 - l31);
+    let (i1, i2, i3) = (s.m11.recip(), d2.recip(), d3.recip());
+    let (m12, m13, m23) = (a * i2 + c * b * i3, c * i3, b * i3);
+    Some(Matrix3::new(i1 + a * a * i2 + c * c * i3, m12, m13, m12, i2 + b * b * i3, m23, m13, m23, i3))
 }
 
 /// An observation that maximum likelihood can use.

@@ -54,15 +54,13 @@ impl Follower<'_> {
         }
         let back = Patch::new(&frame.right_spline, found.u, found.v)?;
         let home = back.locate(&frame.left_spline, (u, v), Freedom::Row, self.settling(NEARLY_SETTLED_PX))?;
-        let plane = patch.covariance_shape()?;
-        let row = patch.row_variance_shape();
+        let localisation = patch.localisation()?;
         ((home.u - u).abs() <= self.options.back_tolerance_px).then_some(StereoCorner {
             u,
             v,
             shift,
             age,
-            plane,
-            row,
+            localisation,
             residual: found.residual,
         })
     }

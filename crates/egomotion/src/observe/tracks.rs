@@ -2,21 +2,21 @@
 //!
 //! A corner of the left image is located in the right image of its time, in the left image of the
 //! next frame and from there in the right one, and back again (the four-way check). Each of the
-//! four images localises the corner with its own independent noise σ_I² G⁻¹, from which the
-//! covariance of (x, y, d) at either end follows.
+//! four images localises the corner with its own independent noise ([`Localisation`]), from which
+//! the covariance of (x, y, d) at either end follows.
 //!
 //! Where a corner was found, with its disparity, is where the next pair follows it from: it lives
 //! as long as it is found. Its window is taken anew in every frame. Nothing drifts, because a
 //! pair's motion is measured between two places of the same window, whatever corner it once was.
 
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::corners::{Cells, corners};
 use super::follow::Follower;
 use super::observation::StereoTrack;
-use super::patch;
+use super::patch::{self, Localisation};
 use super::row_search::search_row;
 use super::stereo_pyramid::StereoPyramid;
 use crate::geometry::{Field, Gaussian, Grid, StereoRig, Twist};
@@ -86,10 +86,8 @@ pub struct StereoCorner {
     pub shift: f64,
     /// Number of frames before this one in which it was seen.
     pub age: u32,
-    /// Covariance of (u, v) per unit grey variance.
-    pub(super) plane: Matrix2<f64>,
-    /// Variance of u in one image per unit grey variance, when it is located along its row.
-    pub(super) row: f64,
+    /// How noise moves its place.
+    pub(super) localisation: Localisation,
     /// Mean squared difference of the left and the right window.
     pub(super) residual: f64,
 }
@@ -161,7 +159,7 @@ pub fn follow(
 
 /// The measurements of all traces of a pair, with covariances from the noise that they share.
 pub fn measured(traces: &[Trace], rig: &StereoRig) -> Vec<StereoTrack> {
-    let noise = grey_noise(traces);
+    let noise = GreyNoise::of(traces);
     traces.iter().filter_map(|trace| trace.track(rig, noise)).collect()
 }
 
@@ -180,45 +178,77 @@ pub fn stereo_tracks(
     measured(&follow(before, after, &corners, rig, hints, expected, options), rig)
 }
 
-/// Variance of a grey level of one image, from the median residual of all matches.
-fn grey_noise(traces: &[Trace]) -> f64 {
-    let mut residuals: Vec<f64> = traces.iter().map(Trace::mean_residual).collect();
-    if residuals.is_empty() {
+/// Variance of a grey level of one image, as the matches show it.
+#[derive(Debug, Clone, Copy)]
+struct GreyNoise {
+    /// From frame to frame.
+    time: f64,
+    /// Between the cameras, which see a surface from two sides.
+    rig: f64,
+}
+
+impl GreyNoise {
+    /// From the medians of all matches of a pair.
+    fn of(traces: &[Trace]) -> Self {
+        Self {
+            time: median(traces.iter().map(Trace::grey_variance).collect()),
+            rig: median(traces.iter().flat_map(|t| [t.before, t.after]).map(|c| c.grey_variance()).collect()),
+        }
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
         return 1.0;
     }
-    let middle = residuals.len() / 2;
-    let (_, &mut median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
-    0.5 * median
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// A window's own variance counts where it is more than chance makes of the pair's: a window has
+/// some twenty independent grey levels, which scatter it by a third.
+fn at_least(pooled: f64, own: f64) -> f64 {
+    pooled.max(own / 1.8).max(QUANTISATION)
 }
 
 /// Variance of a grey level rounded to whole numbers, the least that an image can have.
 const QUANTISATION: f64 = 1.0 / 12.0;
 
 impl Trace {
-    /// Mean squared difference over the three matches.
-    fn mean_residual(&self) -> f64 {
-        (self.before.residual + self.residual + self.after.residual) / 3.0
+    /// Variance of a grey level from the two left windows.
+    fn grey_variance(&self) -> f64 {
+        0.5 * self.residual / self.before.localisation.left_over
     }
 
-    /// The track with its covariances, given the pooled variance of grey levels.
-    fn track(&self, rig: &StereoRig, pooled: f64) -> Option<StereoTrack> {
-        // A window's own residual counts where it is worse than the image at large.
-        let noise = 0.5 * (pooled + (0.5 * self.mean_residual()).max(pooled)).max(QUANTISATION);
-        let (before, after) = (self.before.measured(rig, noise), self.after.measured(rig, noise));
+    /// The track with its covariances, given the pooled variances of grey levels.
+    fn track(&self, rig: &StereoRig, noise: GreyNoise) -> Option<StereoTrack> {
+        let time = at_least(noise.time, self.grey_variance());
+        let end = |corner: &StereoCorner| {
+            corner.measured(rig, GreyNoise { time, rig: at_least(noise.rig, corner.grey_variance()) })
+        };
+        let (before, after) = (end(&self.before), end(&self.after));
         (before.mean.z > 0.0 && after.mean.z > 0.0).then_some(StereoTrack { before, after })
     }
 }
 
 impl StereoCorner {
-    /// (x, y, d) given the variance of grey levels.
-    fn measured(&self, rig: &StereoRig, noise: f64) -> Gaussian<3> {
+    /// Variance of a grey level from the left and the right window.
+    fn grey_variance(&self) -> f64 {
+        0.5 * self.residual / self.localisation.left_over
+    }
+
+    /// (x, y, d) given the variances of grey levels.
+    fn measured(&self, rig: &StereoRig, noise: GreyNoise) -> Gaussian<3> {
         let (x, y) = rig.image_from_pixel(self.u, self.v);
-        let (aspect, row) = (rig.aspect(), self.row);
-        let (xx, xy, yy) =
-            (self.plane[(0, 0)], self.plane[(0, 1)] * aspect, self.plane[(1, 1)] * aspect * aspect);
-        // d is located along the row alone, from the same noise of the left window as x: that
-        // makes cov(x, d) = 1/G_xx, cov(y, d) = 0, and the right window adds as much again.
-        let cov = Matrix3::new(xx, xy, row, xy, yy, 0.0, row, 0.0, 2.0 * row) * noise;
+        let Localisation { plane, plane_row, row, .. } = &self.localisation;
+        let (ratio, both) = (rig.aspect(), noise.time.min(noise.rig));
+        let xd = plane_row.x * both;
+        let plane = plane * noise.time;
+        let (xx, xy, yy) = (plane.m11, plane.m12 * ratio, plane.m22 * ratio * ratio);
+        // d is located along the row alone, from the same noise of the left window as x and y; the
+        // right window adds as much again.
+        let yd = plane_row.y * both * ratio;
+        let cov = Matrix3::new(xx, xy, xd, xy, yy, yd, xd, yd, 2.0 * row * noise.rig);
         Gaussian { mean: Vector3::new(x, y, rig.disparity_from_shift(self.shift)), cov }
     }
 }

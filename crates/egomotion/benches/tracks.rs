@@ -1,0 +1,77 @@
+//! Each step of sparse tracking on one street pair: `cargo bench -p egomotion --bench tracks`.
+//!
+//! Needs real images: KITTI odometry sequence 06 under `EGOMOTION_DATA` or `../shared/data`.
+
+use std::path::PathBuf;
+
+use criterion::Criterion;
+use egomotion::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood, robust_start};
+use egomotion::geometry::{Image, StereoRig};
+use egomotion::observe::StereoPyramid;
+use egomotion::observe::row_disagreement::row_disagreement;
+use egomotion::observe::tracks::{Expected, Hints, TrackOptions, follow, measured, stereo_corners};
+
+fn image(side: usize, frame: usize) -> Option<Image> {
+    let data = std::env::var_os("EGOMOTION_DATA").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
+        PathBuf::from,
+    );
+    let path = data.join(format!("kitti_odometry/sequences/06/image_{side}/{frame:06}.png"));
+    egomotion_io::image::read(&path).ok()
+}
+
+fn tracking(c: &mut Criterion) {
+    let images: Option<Vec<Image>> =
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(s, f)| image(s, f)).into_iter().collect();
+    let Some(images) = images else {
+        println!("SKIPPED: no KITTI odometry sequence 06");
+        return;
+    };
+    let (width, height) = images[0].size();
+    let rig = StereoRig::new(707.0912, (601.8873, 183.1104), 0.5372, (width, height)).unwrap();
+    let likelihood = MaximumLikelihoodOptions::default();
+    let levels = TrackOptions::default().pyramid_levels;
+    let mut before = StereoPyramid::new(&images[0], &images[1], levels);
+    let after = StereoPyramid::new(&images[2], &images[3], levels);
+    c.bench_function("pyramids", |b| b.iter(|| before.renew(&images[0], &images[1], levels)));
+    for corners in [1200, 2000] {
+        let options = TrackOptions { corners, ..TrackOptions::default() };
+        let mut group = c.benchmark_group(format!("{corners}"));
+        let none = Hints::default();
+        group.bench_function("corners, new", |b| {
+            b.iter(|| stereo_corners(&before, &[], &rig, none, &options))
+        });
+        let new = stereo_corners(&before, &[], &rig, none, &options);
+        let far = Expected::FromLevel(usize::MAX);
+        group.bench_function("follow, nothing known", |b| {
+            b.iter(|| follow(&before, &after, &new, &rig, none, far, &options));
+        });
+        let tracks = measured(&follow(&before, &after, &new, &rig, none, far, &options), &rig);
+        group.bench_function("robust start", |b| b.iter(|| robust_start(&tracks, &rig, None, &likelihood)));
+        let start = robust_start(&tracks, &rig, None, &likelihood).unwrap();
+        group.bench_function("maximum likelihood", |b| {
+            b.iter(|| maximum_likelihood(&tracks, &rig, &start, None, &likelihood.kernel));
+        });
+        let motion =
+            maximum_likelihood(&tracks, &rig, &start, None, &likelihood.kernel).unwrap().motion.phi();
+        let known = Hints { motion: Some(&motion), ..none };
+        group.bench_function("follow, motion known", |b| {
+            b.iter(|| follow(&before, &after, &new, &rig, known, Expected::Near, &options));
+        });
+        let kept: Vec<_> = follow(&before, &after, &new, &rig, known, Expected::Near, &options)
+            .iter()
+            .map(|trace| trace.after)
+            .collect();
+        group.bench_function("corners, most kept", |b| {
+            b.iter(|| stereo_corners(&after, &kept, &rig, none, &options))
+        });
+        group.bench_function("row disagreement", |b| b.iter(|| row_disagreement(&before, &tracks, &rig)));
+        group.finish();
+    }
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    tracking(&mut criterion);
+    criterion.final_summary();
+}
