@@ -1,7 +1,9 @@
 //! Dense disparity of small synthetic pairs whose truth is exact.
 
 use egomotion::geometry::{Field, Image};
-use egomotion::observe::disparity::{DisparityError, DisparityMap, DisparityMatcher, DisparityOptions};
+use egomotion::observe::disparity::{
+    DisparityError, DisparityMap, DisparityMatcher, DisparityOptions, GUESS_SIGMA_PX, Matcher,
+};
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -117,9 +119,9 @@ fn no_disparity_is_locked_to_whole_pixels() {
     }
 }
 
-/// A square of disparity 20 in front of a background of disparity 6.
-#[test]
-fn hidden_background_stays_missing() {
+/// A square of disparity 20 in front of a background of disparity 6: the square covers the columns
+/// 90 … 140 and the rows 30 … 90 of the left image.
+fn square_pair() -> (Image, Image) {
     let (background, square) = (Texture::new(50), Texture::new(51));
     let (near, far) = (20.0, 6.0);
     let inside = |u: f64, v: f64| (90.0..140.0).contains(&u) && (30.0..90.0).contains(&v);
@@ -134,17 +136,86 @@ fn hidden_background_stays_missing() {
             grey as f32
         })
     };
-    let map = compute(&view(0.0, 0.0), &view(near, far));
+    (view(0.0, 0.0), view(near, far))
+}
+
+/// Share of the rows of the square and the given columns whose (disparity, σ) passes a test.
+fn share(
+    map: &DisparityMap,
+    columns: std::ops::Range<usize>,
+    test: impl Fn(Option<(f32, f32)>) -> bool,
+) -> f64 {
+    let pixels = columns.clone().flat_map(|u| (34..86).map(move |v| (u, v)));
+    let value = |(u, v)| map.shift.get(u, v).zip(map.sigma.get(u, v));
+    pixels.filter(|&at| test(value(at))).count() as f64 / (columns.len() * 52) as f64
+}
+
+#[test]
+fn hidden_background_stays_missing() {
+    let (left, right) = square_pair();
+    let map = compute(&left, &right);
     // The square hides the 14 background columns left of it from the right camera.
-    let share = |columns: std::ops::Range<usize>, test: &dyn Fn(Option<f32>) -> bool| {
-        let pixels = columns.clone().flat_map(|u| (34..86).map(move |v| (u, v)));
-        pixels.filter(|&(u, v)| test(map.shift.get(u, v))).count() as f64 / (columns.len() * 52) as f64
-    };
-    let hidden = share(78..88, &|d| d.is_none());
-    let seen = share(94..136, &|d| d.is_some_and(|d| (d - 20.0).abs() < 0.5));
-    let beyond = share(146..190, &|d| d.is_some_and(|d| (d - 6.0).abs() < 0.5));
+    let hidden = share(&map, 78..88, |d| d.is_none());
+    let seen = share(&map, 94..136, |d| d.is_some_and(|d| (d.0 - 20.0).abs() < 0.5));
+    let beyond = share(&map, 146..190, |d| d.is_some_and(|d| (d.0 - 6.0).abs() < 0.5));
     assert!(hidden > 0.9, "{hidden} of the hidden pixels are missing");
     assert!(seen > 0.95 && beyond > 0.95, "{seen} of the square, {beyond} of the background");
+}
+
+#[test]
+fn what_is_filled_in_is_behind_and_says_that_it_is_a_guess() {
+    let (left, right) = square_pair();
+    let filled = DisparityMatcher::new(DisparityOptions { fill: true, ..options() });
+    let map = filled.clone().compute(&left, &right).expect("one size");
+    let behind = share(&map, 78..88, |d| d.is_some_and(|d| (d.0 - 6.0).abs() < 1.0));
+    let guessed = share(&map, 78..88, |d| d.is_some_and(|d| d.1 >= GUESS_SIGMA_PX));
+    assert!(behind > 0.9 && guessed > 0.9, "{behind} behind, {guessed} guessed");
+    // What is measured stays as it is.
+    let measured = compute(&left, &right);
+    for (u, v) in (0..SIZE.1).flat_map(|v| (0..SIZE.0).map(move |u| (u, v))) {
+        if measured.shift.get(u, v).is_some() {
+            assert_eq!(measured.shift.get(u, v), map.shift.get(u, v));
+            assert_eq!(measured.sigma.get(u, v), map.sigma.get(u, v));
+        }
+    }
+}
+
+#[test]
+fn area_correlation_answers_to_a_sixteenth() {
+    for (seed, plane) in (20..).zip([Plane(6.0, 0.04, 0.02), Plane(11.0, -0.01, 0.05)])
+    {
+        let (left, right) = plane_pair(plane, 1.0, seed);
+        let options = DisparityOptions { matcher: Matcher::AreaCorrelation, ..options() };
+        let map = DisparityMatcher::new(options).compute(&left, &right).expect("one size");
+        let errors = errors(&map, plane);
+        assert!(errors.len() > 12_000, "{} pixels", errors.len());
+        assert!(map.shift.grid().values().iter().all(|d| d.is_nan() || (d * 16.0).fract() == 0.0));
+        let error = median(errors.iter().map(|e| e.0.abs()).collect());
+        let spread = robust_deviation(&errors.iter().map(|(e, sigma, _)| e / sigma).collect::<Vec<_>>());
+        assert!(error < 0.15, "median error {error} px");
+        assert!((0.6..1.5).contains(&spread), "robust deviation of error/sigma {spread}");
+    }
+}
+
+#[test]
+fn rows_that_disagree_do_not_look_like_disparity() {
+    // Slanted waves alone: a third of a row would be 0.2 px of disparity.
+    let plane = Plane(9.0, 0.0, 0.05);
+    let texture = Texture::new(97);
+    let wave = |x: f64, y: f64| {
+        128.0
+            + 40.0 * (0.5 * x + 0.3 * y).sin()
+            + 15.0 * (0.1 * y).cos() * (0.7 * y).sin()
+            + 0.3 * texture.grey(x, y)
+    };
+    let left = Image::from_fn(SIZE.0, SIZE.1, |u, v| wave(u as f64, v as f64) as f32);
+    let right = Image::from_fn(SIZE.0, SIZE.1, |x, v| {
+        let row = v as f64 - 0.33;
+        wave(plane.left_column(x as f64, row), row) as f32
+    });
+    let errors = errors(&compute(&left, &right), plane);
+    let bias = median(errors.iter().map(|e| e.0).collect());
+    assert!(errors.len() > 12_000 && bias.abs() < 0.06, "{} pixels, bias {bias} px", errors.len());
 }
 
 #[test]

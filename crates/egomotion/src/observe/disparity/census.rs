@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::lanes::{Bytes, Kernel, LANES, widest};
+use super::smoothing::Smoothed;
 use crate::geometry::Image;
 
 /// The neighbourhood of the census transform, width × height in pixels.
@@ -72,7 +73,7 @@ const BITS: usize = 8;
 /// In rows of `stride` bytes of plane after plane.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Census {
-    smoothed: Vec<i16>,
+    smoothed: Smoothed,
     bytes: Vec<u8>,
     /// Planes of a row.
     pub planes: usize,
@@ -85,8 +86,8 @@ pub(super) struct Census {
 impl Census {
     /// The words of `image`, of the last column first if `mirrored`.
     ///
-    /// The image is smoothed first (binomial, 3 × 3): that calms the noise of the order, and forgives
-    /// the fractions of a row by which rectification is wrong. Outside the image the nearest pixel counts.
+    /// The image is smoothed first: that calms the noise of the order, and forgives the fractions of a
+    /// row by which rectification is wrong. Outside the image the nearest pixel counts.
     pub fn compute(&mut self, image: &Image, window: CensusWindow, scale: f32, mirrored: bool) {
         let (width, height) = image.size();
         let (ru, rv) = window.radii();
@@ -96,22 +97,16 @@ impl Census {
         }
         self.planes = comparisons.len().div_ceil(BITS);
         self.stride = width.next_multiple_of(LANES);
-        let padded = self.stride + 2 * ru;
-        self.smoothed.resize(padded * height, 0);
         self.bytes.resize(self.stride * self.planes * height, 0);
         if self.bytes.is_empty() {
             return;
         }
         self.halve = window.bits() > LARGEST_COST.into();
+        self.smoothed.compute(image, ru, scale, mirrored);
         let Self { smoothed, bytes, planes, stride, .. } = self;
-        smoothed.par_chunks_mut(padded).enumerate().for_each_init(
-            || vec![0.0_f32; width],
-            |column, (v, row)| widest(Smooth { image, v, row, margin: ru, scale, mirrored, column }),
-        );
-        let row = |v: usize| &smoothed[v * padded..(v + 1) * padded];
         bytes.par_chunks_mut(*stride * *planes).enumerate().for_each_init(Vec::new, |rows, (v, bytes)| {
             rows.clear();
-            rows.extend((0..=2 * rv).map(|j| row((v + j).saturating_sub(rv).min(height - 1))));
+            rows.extend((0..=2 * rv).map(|j| smoothed.row((v + j).saturating_sub(rv).min(height - 1))));
             widest(Compare { rows, comparisons: &comparisons, bytes, stride: *stride });
         });
     }
@@ -121,84 +116,6 @@ impl Census {
         let size = self.stride * self.planes;
         &self.bytes[v * size..(v + 1) * size]
     }
-}
-
-/// The factor that spreads the grey levels of a pair over 15 bits: a power of two, so that whole
-/// grey levels stay exact.
-pub(super) fn grey_scale(images: [&Image; 2]) -> f32 {
-    let largest = |image: &Image| {
-        image.values().par_chunks(1 << 14).map(|part| widest(Largest(part))).reduce(|| 0.0, f32::max)
-    };
-    let largest = largest(images[0]).max(largest(images[1]));
-    if largest > 0.0 { (32_767.0 / largest).log2().floor().clamp(-100.0, 100.0).exp2() } else { 1.0 }
-}
-
-struct Largest<'a>(&'a [f32]);
-
-impl Kernel for Largest<'_> {
-    type Output = f32;
-    #[inline(always)]
-    fn run<B: Bytes>(self) -> f32 {
-        let mut most = [0.0_f32; LANES];
-        let (parts, rest) = self.0.as_chunks::<LANES>();
-        let size = |x: f32| if x.abs() < f32::INFINITY { x.abs() } else { 0.0 };
-        for part in parts {
-            for (most, &x) in most.iter_mut().zip(part) {
-                let x = size(x);
-                *most = if x > *most { x } else { *most };
-            }
-        }
-        most.iter().copied().chain(rest.iter().map(|&x| size(x))).fold(0.0, f32::max)
-    }
-}
-
-/// Row `v` smoothed by (1, 2, 1)/4 both ways, continued by `margin` and more copies of its ends.
-struct Smooth<'a> {
-    image: &'a Image,
-    v: usize,
-    row: &'a mut [i16],
-    margin: usize,
-    scale: f32,
-    mirrored: bool,
-    column: &'a mut [f32],
-}
-
-impl Kernel for Smooth<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<B: Bytes>(self) {
-        let Self { image, v, row, margin, scale, mirrored, column } = self;
-        let (width, height) = image.size();
-        let (above, here) = (image.row(v.saturating_sub(1)), image.row(v));
-        let below = image.row((v + 1).min(height - 1));
-        let scale = scale / 16.0;
-        for (((column, a), h), b) in column.iter_mut().zip(above).zip(here).zip(below) {
-            *column = (a + 2.0 * h + b) * scale;
-        }
-        let inner = &mut row[margin..margin + width];
-        for (smooth, three) in inner[1.min(width)..].iter_mut().zip(column.windows(3)) {
-            *smooth = whole(three[0] + 2.0 * three[1] + three[2]);
-        }
-        let last = width - 1;
-        inner[0] = whole(3.0 * column[0] + column[1.min(last)]);
-        inner[last] = whole(3.0 * column[last] + column[last.saturating_sub(1)]);
-        if mirrored {
-            inner.reverse();
-        }
-        let (first, last) = (inner[0], inner[last]);
-        row[..margin].fill(first);
-        row[margin + width..].fill(last);
-    }
-}
-
-/// The nearest whole number of what 16 bits hold; anything of anything else.
-///
-/// After this addition the last bits of the number are those of the whole number: a few operations
-/// on vectors, where a checked conversion takes many.
-#[inline(always)]
-fn whole(x: f32) -> i16 {
-    const LAST_BIT_IS_ONE: f32 = 12_582_912.0;
-    (x + LAST_BIT_IS_ONE).to_bits() as i16
 }
 
 /// The bytes of a row from the smoothed rows of its window.
@@ -235,6 +152,7 @@ impl Kernel for Compare<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::smoothing::grey_scale;
     use super::*;
 
     const WINDOWS: [CensusWindow; 4] = [

@@ -16,6 +16,9 @@ const FARTHER_SIGMA: f32 = 2.0;
 /// Growth of the standard deviation with the distance from the end, where a gap has one end only.
 const SIGMA_PER_PIXEL: f32 = 0.03;
 
+/// Pixels that tell of the surface at an end of a gap.
+const END_PIXELS: usize = 5;
+
 /// Fill the gaps of a row (NaN) that are no wider than `widest`.
 ///
 /// A gap that occlusion explains is not wider than the range of disparity; beyond that nothing is known.
@@ -26,8 +29,8 @@ pub(super) fn fill_row(shift: &mut [f32], sigma: &mut [f32], widest: usize) {
         if gap.len() > widest {
             continue;
         }
-        let end = |u: Option<usize>| u.and_then(|u| Some((*shift.get(u)?, *sigma.get(u)?)));
-        let (before, after) = (end(gap.start.checked_sub(1)), end(Some(gap.end)));
+        let before = end(shift, sigma, (0..gap.start).rev());
+        let after = end(shift, sigma, gap.end..shift.len());
         for u in gap.clone() {
             let (value, spread) = match (before, after) {
                 (Some(a), Some(b)) => {
@@ -40,6 +43,21 @@ pub(super) fn fill_row(shift: &mut [f32], sigma: &mut [f32], widest: usize) {
             (shift[u], sigma[u]) = (value, spread);
         }
     }
+}
+
+/// The surface at an end of a gap: the median of the pixels from there on, and its standard deviation.
+///
+/// The last pixel alone may well be part of what hides the gap.
+fn end(shift: &[f32], sigma: &[f32], pixels: impl Iterator<Item = usize>) -> Option<(f32, f32)> {
+    let mut near = [(0.0, 0.0); END_PIXELS];
+    let mut count = 0;
+    for (slot, u) in near.iter_mut().zip(pixels.take_while(|&u| !shift[u].is_nan())) {
+        *slot = (shift[u], sigma[u]);
+        count += 1;
+    }
+    let near = &mut near[..count];
+    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    near.get(count / 2).copied()
 }
 
 /// The next pixels without a value, from `start` on.

@@ -240,6 +240,10 @@ pub(super) trait Kernel {
 
 /// Run a kernel with the widest vectors of this processor.
 pub(super) fn widest<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(test)]
+    if tests::PLAIN.load(std::sync::atomic::Ordering::Relaxed) {
+        return kernel.run::<Array>();
+    }
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2")
         && std::arch::is_x86_feature_detected!("bmi1")
@@ -255,4 +259,68 @@ pub(super) fn widest<K: Kernel>(kernel: K) -> K::Output {
         return unsafe { wide(kernel) };
     }
     kernel.run::<Array>()
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use super::*;
+
+    /// Makes every kernel run on arrays. Other tests may run meanwhile: their answers are the same.
+    pub static PLAIN: AtomicBool = AtomicBool::new(false);
+
+    /// All operations of two vectors, one after the other.
+    struct Operations([u8; LANES], [u8; LANES]);
+
+    impl Kernel for Operations {
+        type Output = (Vec<[u8; LANES]>, u32);
+        fn run<B: Bytes>(self) -> Self::Output {
+            let (a, b) = (B::from_array(self.0), B::from_array(self.1));
+            let answers = [
+                a.min(b),
+                a.max(b),
+                a.plus(b),
+                a.minus(b),
+                a.distance(b),
+                a.least(),
+                a.moved_up(b),
+                a.moved_down(b),
+                a.halved(),
+                B::splat(self.0[3]),
+            ];
+            (answers.map(B::to_array).to_vec(), a.at_most(b))
+        }
+    }
+
+    #[test]
+    fn registers_compute_what_arrays_do() {
+        let mut state = 7_u32;
+        let mut bytes = || {
+            let mut next = || {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                // Ties and the ends of the range come often.
+                [(state >> 24) as u8, 0, 255, 128, 127][(state >> 8) as usize % 9 % 5]
+            };
+            std::array::from_fn::<u8, LANES, _>(|_| next())
+        };
+        for _ in 0..500 {
+            let (a, b) = (bytes(), bytes());
+            assert_eq!(widest(Operations(a, b)), Operations(a, b).run::<Array>());
+        }
+    }
+
+    #[test]
+    fn bytes_are_what_they_say() {
+        let a: [u8; LANES] = std::array::from_fn(|i| 8 * i as u8 + 3);
+        let b: [u8; LANES] = std::array::from_fn(|i| 250 - 7 * i as u8);
+        let (answers, at_most) = Operations(a, b).run::<Array>();
+        let expected = |f: &dyn Fn(usize) -> u8| std::array::from_fn::<u8, LANES, _>(f);
+        assert_eq!(answers[2], expected(&|i| (u16::from(a[i]) + u16::from(b[i])).min(255) as u8));
+        assert_eq!(answers[3], expected(&|i| (i16::from(a[i]) - i16::from(b[i])).max(0) as u8));
+        assert_eq!(answers[5], [3; LANES]);
+        assert_eq!(answers[6], expected(&|i| if i == 0 { b[31] } else { a[i - 1] }));
+        assert_eq!(answers[7], expected(&|i| if i == 31 { b[0] } else { a[i + 1] }));
+        assert_eq!(at_most, (0..32).filter(|&i| a[i] <= b[i]).map(|i| 1 << i).sum::<u32>());
+    }
 }

@@ -4,6 +4,7 @@
 //! to believe, photometric sub-pixel refinement, and holes filled from either side. What is filled
 //! in has a standard deviation of [`GUESS_SIGMA_PX`] and more; wide holes stay missing.
 
+mod area;
 mod census;
 mod check;
 mod fill;
@@ -11,6 +12,8 @@ mod lanes;
 mod lucas_kanade;
 mod rows;
 mod semi_global;
+mod slopes;
+mod smoothing;
 mod speckles;
 mod subpixel;
 mod surface;
@@ -19,9 +22,22 @@ mod sweep;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+pub use area::AreaOptions;
 pub use census::CensusWindow;
 
 use crate::geometry::{Field, Image};
+
+/// Which matcher finds the disparities that refinement begins with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Matcher {
+    /// Census and semi-global matching: dense, robust.
+    #[default]
+    SemiGlobal,
+    /// Area correlation to 1/16 pixel, as the stereo cameras of the paper have it. Answers where there
+    /// is texture; its disparities are not refined.
+    AreaCorrelation,
+}
 
 /// How disparity is found. Penalties are in bits of the census words' Hamming distance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -29,11 +45,15 @@ use crate::geometry::{Field, Image};
 pub struct DisparityOptions {
     /// Disparities tried: 0 … `levels` − 1 pixels. Limited to the image's width.
     pub levels: usize,
+    /// Which matcher.
+    pub matcher: Matcher,
+    /// Of the area correlation: its window and what it believes.
+    pub area: AreaOptions,
     /// Neighbourhood compared.
     pub census: CensusWindow,
-    /// P1: cost of a step of one level between neighbours, at most 190.
+    /// P1: cost of a step of one level between neighbours, at most 54.
     pub penalty_small: u8,
-    /// P2: cost of a jump between neighbours of equal grey level, at most 190.
+    /// P2: cost of a jump between neighbours of equal grey level, at most 54.
     pub penalty_large: u8,
     /// The least that P2 becomes where the grey level jumps.
     pub penalty_large_least: u8,
@@ -57,6 +77,8 @@ impl Default for DisparityOptions {
     fn default() -> Self {
         Self {
             levels: 128,
+            matcher: Matcher::default(),
+            area: AreaOptions::default(),
             census: CensusWindow::default(),
             penalty_small: 10,
             penalty_large: 54,
@@ -121,6 +143,9 @@ pub struct DisparityMatcher {
     left_words: census::Census,
     right_words: census::Census,
     semi_global: semi_global::SemiGlobal,
+    left_slopes: slopes::Slopes,
+    right_slopes: slopes::Slopes,
+    area: area::AreaCorrelation,
     winners: Vec<f32>,
     speckles: speckles::Speckles,
     refinement: subpixel::Refinement,
@@ -153,16 +178,20 @@ impl DisparityMatcher {
             return Ok(map);
         }
         let options = &self.options;
-        let scale = census::grey_scale([left, right]);
-        self.left_words.compute(left, options.census, scale, false);
-        self.right_words.compute(right, options.census, scale, true);
         self.winners.resize(width * height, f32::NAN);
-        let pair =
-            semi_global::Pair { left, left_words: &self.left_words, right_words: &self.right_words, levels };
-        self.semi_global.winners(&pair, options, &mut self.winners);
+        match options.matcher {
+            Matcher::SemiGlobal => self.match_semi_globally(left, right, levels),
+            Matcher::AreaCorrelation => self.correlate_areas(left, right, levels),
+        }
+        let options = &self.options;
         let (size, range) = (options.speckle_size, options.speckle_range);
         self.speckles.remove(&mut self.winners, width, size, range);
-        self.refinement.refine(left, right, &self.winners, options.refinement_steps.max(1));
+        match options.matcher {
+            Matcher::SemiGlobal => {
+                self.refinement.refine(left, right, &self.winners, options.refinement_steps.max(1));
+            }
+            Matcher::AreaCorrelation => self.refinement.judge(left, right, &self.winners),
+        }
         let rows = (map.shift.rows_mut()).zip(map.sigma.rows_mut());
         rows.zip(self.refinement.rows()).for_each(|((to_shift, to_sigma), (shift, sigma))| {
             to_shift.copy_from_slice(shift);
@@ -172,5 +201,79 @@ impl DisparityMatcher {
             }
         });
         Ok(map)
+    }
+
+    fn match_semi_globally(&mut self, left: &Image, right: &Image, levels: usize) {
+        let options = &self.options;
+        let scale = smoothing::grey_scale([left, right]);
+        self.left_words.compute(left, options.census, scale, false);
+        self.right_words.compute(right, options.census, scale, true);
+        let (left_words, right_words) = (&self.left_words, &self.right_words);
+        let pair = semi_global::Pair { left, left_words, right_words, levels };
+        self.semi_global.winners(&pair, options, &mut self.winners);
+    }
+
+    fn correlate_areas(&mut self, left: &Image, right: &Image, levels: usize) {
+        let scale = smoothing::grey_scale([left, right]);
+        self.left_slopes.compute(left, scale, false);
+        self.right_slopes.compute(right, scale, true);
+        let pair = area::Pair {
+            left: &self.left_slopes,
+            right: &self.right_slopes,
+            width: left.width(),
+            height: left.height(),
+            levels,
+            options: &self.options.area,
+        };
+        self.area.winners(&pair, &mut self.winners);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::Ordering;
+
+    use super::*;
+
+    /// A rough pair of textured steps, of odd size.
+    fn pair(width: usize, height: usize, depth: f32) -> (Image, Image) {
+        let grey = |u: usize, v: usize| {
+            let hash = (u as u32).wrapping_mul(2_654_435_761) ^ (v as u32).wrapping_mul(40_503);
+            let noise = (hash ^ (hash >> 13)).wrapping_mul(1_274_126_177) >> 24;
+            noise as f32 / 255.0 * depth
+        };
+        let left = Image::from_fn(width, height, grey);
+        let right = Image::from_fn(width, height, |u, v| grey(u + if v < height / 2 { 3 } else { 11 }, v));
+        (left, right)
+    }
+
+    #[test]
+    fn the_answer_depends_not_on_the_vectors() {
+        let bits = |map: &DisparityMap| -> Vec<u32> {
+            let planes = [map.shift.grid(), map.sigma.grid()];
+            planes.iter().flat_map(|plane| plane.values().iter().map(|v| v.to_bits())).collect()
+        };
+        let windows = [
+            CensusWindow::FiveByFive,
+            CensusWindow::SevenBySeven,
+            CensusWindow::NineBySeven,
+            CensusWindow::Symmetric,
+        ];
+        let semi_global = windows.map(|census| (Matcher::SemiGlobal, census));
+        let area = (Matcher::AreaCorrelation, CensusWindow::default());
+        for (matcher, census) in semi_global.into_iter().chain([area]) {
+            for (width, height, levels, depth) in
+                [(131, 37, 24, 255.0), (97, 21, 97, 65_535.0), (33, 9, 40, 1.0)]
+            {
+                let (left, right) = pair(width, height, depth);
+                let options = DisparityOptions { matcher, census, levels, ..DisparityOptions::default() };
+                let wide = DisparityMatcher::new(options.clone()).compute(&left, &right).unwrap();
+                lanes::tests::PLAIN.store(true, Ordering::Relaxed);
+                let plain = DisparityMatcher::new(options).compute(&left, &right).unwrap();
+                lanes::tests::PLAIN.store(false, Ordering::Relaxed);
+                assert!(wide.shift.density() > 0.5, "{matcher:?} {census:?} {}", wide.shift.density());
+                assert_eq!(bits(&wide), bits(&plain), "{matcher:?} {census:?} {width} x {height}");
+            }
+        }
     }
 }

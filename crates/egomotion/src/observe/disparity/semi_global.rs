@@ -12,6 +12,7 @@ use rayon::prelude::*;
 
 use super::DisparityOptions;
 use super::census::Census;
+use super::check::{Claims, Winner, believe};
 use super::lanes::{LANES, widest};
 use super::sweep::{Back, Forth, blocks_for, with_blocks};
 use crate::geometry::Image;
@@ -112,19 +113,8 @@ struct Strip {
     right_row: Vec<u8>,
     p2_left: Vec<u8>,
     p2_above: Vec<u8>,
-    claims: Vec<u32>,
+    claims: Claims,
     best: Vec<Winner>,
-}
-
-/// The level of least cost of a pixel.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Winner {
-    /// The level.
-    pub level: u16,
-    /// Cost of the level below, of the level, and of the one above.
-    pub costs: [u8; 3],
-    /// Whether no other level but its neighbours is as cheap.
-    pub unique: bool,
 }
 
 impl Strip {
@@ -195,6 +185,7 @@ impl Strip {
                 best: &mut self.best,
             })
         );
-        super::check::believe(&self.best, options.left_right_tolerance, &mut self.claims, winners);
+        self.claims.of_winners(&self.best);
+        believe(&self.best, options.left_right_tolerance, &self.claims, winners);
     }
 }

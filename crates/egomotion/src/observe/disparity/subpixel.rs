@@ -9,6 +9,7 @@
 
 use rayon::prelude::*;
 
+use super::check::NO_LEVEL;
 use super::lanes::{Bytes, Kernel, widest};
 use super::lucas_kanade::{Differences, Fit, FitRow, row_length};
 use super::rows::{RowOffset, beside};
@@ -32,11 +33,11 @@ const MISFIT_WEIGHT: f32 = 1.0;
 const STRAY_WEIGHT: f32 = 4.0;
 
 /// Offset of the minimum of the parabola through three neighbouring costs, −½ … ½; 0 beside the
-/// end of the levels (255) and where there is no minimum.
-pub(super) fn parabola(costs: [u8; 3]) -> f32 {
+/// end of the levels and where there is no minimum.
+pub(super) fn parabola(costs: [u16; 3]) -> f32 {
     let [before, here, after] = costs.map(f32::from);
     let curvature = before - 2.0 * here + after;
-    let beside_end = costs[0].max(costs[2]) == u8::MAX;
+    let beside_end = costs[0].max(costs[2]) == NO_LEVEL;
     if curvature > 0.0 && !beside_end { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }
 
@@ -60,6 +61,18 @@ pub(super) struct Refinement {
     refined: Vec<f32>,
     sigma: Vec<f32>,
     noise: Vec<f32>,
+}
+
+/// Every how many pixels the median over an image is taken of.
+const SAMPLING: usize = 61;
+/// Correction, in typical ones, from which on a pixel is worse than the others.
+const OUTLYING: f32 = 3.0;
+
+/// The median of the values that are numbers.
+fn median(values: impl Iterator<Item = f32>) -> Option<f32> {
+    let mut sample: Vec<f32> = values.filter(|n| !n.is_nan()).collect();
+    let middle = sample.len() / 2;
+    (!sample.is_empty()).then(|| *sample.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 /// The window's rows around row `v` of a plane with rows of `stride`, RADIUS.1 up and down; outside
@@ -91,6 +104,29 @@ impl Refinement {
             let typical_noise = self.typical_noise();
             self.solve(typical_noise, step == 0);
         }
+    }
+
+    /// How sure `given` is (row-major, NaN is missing), which stays the answer.
+    ///
+    /// What one step would correct is the error of `given`: its typical size adds to the standard
+    /// deviation of the step everywhere, its own where it is far more.
+    pub(super) fn judge(&mut self, left: &Image, right: &Image, given: &[f32]) {
+        self.refine(left, right, given, 1);
+        let (stride, width) = (self.stride(), self.width);
+        let rows = self.refined.chunks(stride).zip(given.chunks(width.max(1)));
+        let steps =
+            rows.flat_map(|(row, given)| row[RADIUS.0..].iter().zip(given).map(|(r, d)| (r - d).abs()));
+        let typical = 1.4826 * median(steps.step_by(SAMPLING)).unwrap_or(0.0);
+        let rows = self.refined.par_chunks_mut(stride).zip(self.sigma.par_chunks_mut(stride));
+        rows.zip(given.par_chunks(width.max(1))).for_each(|((refined, sigma), given)| {
+            let pixels = refined[RADIUS.0..].iter_mut().zip(&mut sigma[RADIUS.0..]);
+            for ((refined, sigma), &given) in pixels.zip(given) {
+                let step = (*refined - given).abs();
+                let error = if step > OUTLYING * typical { step } else { typical };
+                *sigma = (*sigma * *sigma + error * error).sqrt();
+                *refined = given;
+            }
+        });
     }
 
     /// The answer, row after row: disparity and standard deviation, NaN is missing.
@@ -189,9 +225,7 @@ impl Refinement {
 
     /// Median over the image of the noise variance of the last step; `None` before the first.
     fn typical_noise(&self) -> Option<f32> {
-        let mut sample: Vec<f32> = self.noise.iter().step_by(61).copied().filter(|n| !n.is_nan()).collect();
-        let middle = sample.len() / 2;
-        (!sample.is_empty()).then(|| *sample.select_nth_unstable_by(middle, f32::total_cmp).1)
+        median(self.noise.iter().copied().step_by(SAMPLING))
     }
 
     /// Solve for the disparity of every window.
@@ -409,9 +443,8 @@ mod tests {
 
     #[test]
     fn the_parabola_finds_its_minimum() {
-        let cost = |d: f64| (200.0 * (d - 0.3).powi(2)) as u8;
-        let costs = [-0.7, 0.3, 1.3].map(|d| cost(d + 0.3));
-        assert!((parabola(costs) - 0.0).abs() < 1.0);
-        assert_eq!((parabola([7, 7, 7]), parabola([255, 3, 9])), (0.0, 0.0));
+        let costs = [1.0, 0.0, -1.0].map(|d: f64| (1000.0 * (d + 0.3).powi(2)) as u16);
+        assert!((parabola(costs) - 0.3).abs() < 1e-3);
+        assert_eq!((parabola([7, 7, 7]), parabola([NO_LEVEL, 3, 9])), (0.0, 0.0));
     }
 }

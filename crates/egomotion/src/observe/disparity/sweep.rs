@@ -4,8 +4,8 @@
 //! L(d) = C(d) + min(l(d), l(d∓1) + P1, P2) with l = L − min L of the pixel before. L itself is
 //! summed.
 
+use super::check::{NO_LEVEL, Winner};
 use super::lanes::{Bytes, Kernel, LANES};
-use super::semi_global::Winner;
 
 /// Cost beyond the ends of the levels: no path enters from there.
 const WALL: u8 = u8::MAX;
@@ -198,11 +198,11 @@ impl<const BLOCKS: usize> Kernel for Back<'_, BLOCKS> {
             let mut along = [B::splat(0); BLOCKS];
             let mut totals = [B::splat(0); BLOCKS];
             let (mut least_along, mut least) = (B::splat(WALL), B::splat(WALL));
-            for block in 0..BLOCKS {
+            for (block, along) in along.iter_mut().enumerate() {
                 let cost = B::load(matching, block * LANES);
-                along[block] = leftward.hand_on(block, p1, p2).plus(cost);
-                least_along = least_along.min(along[block]);
-                totals[block] = along[block].plus(B::load(sums, block * LANES));
+                *along = leftward.hand_on(block, p1, p2).plus(cost);
+                least_along = least_along.min(*along);
+                totals[block] = along.plus(B::load(sums, block * LANES));
                 total[block] = totals[block].to_array();
                 least = least.min(totals[block]);
             }
@@ -223,13 +223,16 @@ impl<const BLOCKS: usize> Kernel for Back<'_, BLOCKS> {
                 rivals += totals[block].at_most(bound).count_ones();
             }
             let total = total.as_flattened();
-            let below = if level > 0 { total[level - 1] } else { WALL };
-            let above = if level + 1 < self.levels { total[level + 1] } else { WALL };
-            let own = 1 + u32::from(below <= rival) + u32::from(above <= rival);
+            let cost = |level: usize| match total.get(level) {
+                Some(&cost) if level < self.levels => u16::from(cost),
+                _ => NO_LEVEL,
+            };
+            let (below, above) = (cost(level.wrapping_sub(1)), cost(level + 1));
+            let own = 1 + u32::from(below <= rival.into()) + u32::from(above <= rival.into());
             let inside = self.levels.min(u + 1);
             self.best[u] = Winner {
                 level: level as u16,
-                costs: [below, least_cost, above],
+                costs: [below, least_cost.into(), above],
                 unique: rivals <= own && (level >= 2 || level + 2 < inside),
             };
         }
