@@ -25,11 +25,13 @@ const END_PIXELS: usize = 5;
 pub(super) fn fill_row(shift: &mut [f32], sigma: &mut [f32], widest: usize) {
     let mut start = 0;
     while let Some(gap) = next_gap(shift, start) {
+        // What was filled in before does not count as an end.
+        let measured = start..gap.start;
         start = gap.end;
         if gap.len() > widest {
             continue;
         }
-        let before = end(shift, sigma, (0..gap.start).rev());
+        let before = end(shift, sigma, measured.rev());
         let after = end(shift, sigma, gap.end..shift.len());
         for u in gap.clone() {
             let (value, spread) = match (before, after) {

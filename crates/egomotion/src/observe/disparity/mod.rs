@@ -263,7 +263,7 @@ mod tests {
         let area = (Matcher::AreaCorrelation, CensusWindow::default());
         for (matcher, census) in semi_global.into_iter().chain([area]) {
             for (width, height, levels, depth) in
-                [(131, 37, 24, 255.0), (97, 21, 97, 65_535.0), (33, 9, 40, 1.0)]
+                [(131, 37, 24, 255.0), (97, 21, 97, 65_535.0), (61, 33, 70, 1.0)]
             {
                 let (left, right) = pair(width, height, depth);
                 let options = DisparityOptions { matcher, census, levels, ..DisparityOptions::default() };

@@ -207,9 +207,7 @@ impl<const BLOCKS: usize> Kernel for Back<'_, BLOCKS> {
                 least = least.min(totals[block]);
             }
             let least_along = least_along.least();
-            for (path, along) in leftward.0.iter_mut().zip(along) {
-                *path = along.minus(least_along);
-            }
+            leftward = Along(along.map(|cost| cost.minus(least_along)));
             let least = least.least();
             let least_cost = least.to_array()[0];
             let rival = rivals_of[usize::from(least_cost)];
