@@ -8,9 +8,9 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::check::{Claims, NO_LEVEL, Winner, believe};
+use super::check::{Claims, NO_LEVEL, Winner};
 use super::lanes::{Bytes, Kernel, LANES, widest};
-use super::slopes::Slopes;
+use super::slopes::{Slopes, ZERO};
 
 /// Rows answered by one strip. The strips are fixed, so the answer does not depend on the threads.
 const STRIP_ROWS: usize = 48;
@@ -18,6 +18,13 @@ const STRIP_ROWS: usize = 48;
 const LARGEST_RADIUS: usize = 10;
 /// Fraction of a pixel to which disparity is told.
 const RESOLUTION_PX: f32 = 1.0 / 16.0;
+/// Pixels that the smoothing by (1, 2, 1)/4 both ways makes one observation: 1/Σw².
+const SMOOTHED_PIXELS: f32 = (16.0 / 6.0) * (16.0 / 6.0);
+/// Growth of the variance for the depth inside a window that no one disparity fits; measured on
+/// Middlebury and KITTI pairs.
+const MISFIT: f32 = 1.7;
+/// What no image noise explains, in pixels: the shape of the cost between the levels.
+const MODEL_SIGMA_PX: f32 = 0.05;
 
 /// How areas are correlated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -59,12 +66,14 @@ pub(super) struct Pair<'a> {
 }
 
 impl AreaCorrelation {
-    /// The winning disparity of every pixel, to 1/16 pixel, NaN where no winner is to be believed.
-    pub(super) fn winners(&mut self, pair: &Pair<'_>, winners: &mut [f32]) {
+    /// The winning disparity of every pixel, to 1/16 pixel, and its standard deviation; NaN where no
+    /// winner is to be believed.
+    pub(super) fn winners(&mut self, pair: &Pair<'_>, winners: &mut [f32], sigma: &mut [f32]) {
         self.strips.resize_with(pair.height.div_ceil(STRIP_ROWS), Strip::default);
-        let chunks = winners.par_chunks_mut(STRIP_ROWS * pair.width);
-        self.strips.par_iter_mut().zip(chunks).enumerate().for_each(|(index, (strip, winners))| {
-            strip.run(pair, index * STRIP_ROWS, winners);
+        let strip = STRIP_ROWS * pair.width;
+        let answers = winners.par_chunks_mut(strip).zip(sigma.par_chunks_mut(strip));
+        self.strips.par_iter_mut().zip(answers).enumerate().for_each(|(index, (strip, answers))| {
+            strip.run(pair, index * STRIP_ROWS, answers);
         });
     }
 }
@@ -72,193 +81,225 @@ impl AreaCorrelation {
 /// One strip's work space.
 #[derive(Debug, Clone, Default)]
 struct Strip {
-    /// Per pixel and level the sum of the differences of its column's part of the window.
+    /// Per pixel and level the sum of the differences of its column's part of the window, after zeros
+    /// for the pixel before the first.
     columns: Vec<u16>,
     /// The same of the slopes themselves.
     texture: Vec<u16>,
-    /// The right row, and a margin for levels beyond it.
-    right_row: Vec<u8>,
+    /// Per level the sum over the window.
+    sums: Vec<u16>,
+    enters: Line,
+    leaves: Line,
     best: Vec<Winner>,
     claims: Claims,
 }
 
+/// A row of both images.
+#[derive(Debug, Clone, Default)]
+struct Line {
+    left: Vec<u8>,
+    /// Mirrored, so that the candidates of rising disparity stand side by side, with a margin for
+    /// levels beyond the row.
+    right: Vec<u8>,
+}
+
+impl Line {
+    /// Row `v`; where there is none a row without slopes, which changes no sum.
+    fn take(&mut self, pair: &Pair<'_>, v: Option<usize>, margin: usize) {
+        self.left.clear();
+        self.right.clear();
+        if let Some(v) = v {
+            self.left.extend_from_slice(pair.left.row(v));
+            self.right.extend_from_slice(pair.right.row(v));
+        }
+        self.left.resize(pair.width, ZERO);
+        self.right.resize(pair.width + margin, ZERO);
+    }
+}
+
 impl Strip {
-    fn run(&mut self, pair: &Pair<'_>, first: usize, winners: &mut [f32]) {
+    fn run(&mut self, pair: &Pair<'_>, first: usize, (winners, sigma): (&mut [f32], &mut [f32])) {
         let radius = pair.options.radius.min(LARGEST_RADIUS);
         let stride = pair.levels.next_multiple_of(LANES);
         self.columns.clear();
-        self.columns.resize(pair.width * stride, 0);
+        self.columns.resize((pair.width + 1) * stride, 0);
         self.texture.clear();
         self.texture.resize(pair.width, 0);
+        self.sums.resize(stride, 0);
         self.best.resize(pair.width, Winner::default());
-        for v in first.saturating_sub(radius)..(first + radius).min(pair.height) {
-            self.change(pair, stride, v, true);
+        let start = first.saturating_sub(radius);
+        for v in start..(first + radius).min(pair.height) {
+            self.exchange(pair, Some(v), None);
+            let Self { enters, leaves, columns, texture, .. } = self;
+            widest(Exchange { enters, leaves, columns, texture, stride });
         }
-        for (v, winners) in (first..).zip(winners.chunks_mut(pair.width)) {
-            if v + radius < pair.height {
-                self.change(pair, stride, v + radius, true);
-            }
+        let answers = winners.chunks_mut(pair.width).zip(sigma.chunks_mut(pair.width));
+        for (v, (winners, sigma)) in (first..).zip(answers) {
+            let enters = Some(v + radius).filter(|&v| v < pair.height);
+            self.exchange(pair, enters, v.checked_sub(radius + 1).filter(|&v| v >= start));
             let rows = (v + radius).min(pair.height - 1) + 1 - v.saturating_sub(radius);
-            let window = Window {
-                columns: &self.columns,
-                texture: &self.texture,
-                stride,
+            let Self { columns, texture, sums, enters, leaves, best, claims } = self;
+            widest(Windows {
+                columns: Exchange { enters, leaves, columns, texture, stride },
+                sums,
                 radius,
                 levels: pair.levels,
                 uniqueness: pair.options.uniqueness,
                 // The sum of a window; at the border less of it is inside.
                 least_texture: pair.options.texture * (rows * (2 * radius + 1)) as f32,
-                best: &mut self.best,
-                claims: &mut self.claims,
-            };
-            widest(window);
-            believe(&self.best, pair.options.left_right_tolerance, &self.claims, winners);
-            for winner in winners {
-                *winner = (*winner / RESOLUTION_PX).round() * RESOLUTION_PX;
-            }
-            if let Some(v) = v.checked_sub(radius) {
-                self.change(pair, stride, v, false);
+                best,
+            });
+            claims.of_winners(best);
+            let tolerance = pair.options.left_right_tolerance;
+            let pixels = (rows * (2 * radius + 1)) as f32;
+            for ((u, winner), (shift, sigma)) in best.iter().enumerate().zip(winners.iter_mut().zip(sigma)) {
+                let believed = winner.unique && claims.agree(u, winner.level, tolerance);
+                (*shift, *sigma) = if believed { answer(winner, pixels) } else { (f32::NAN, f32::NAN) };
             }
         }
     }
 
-    /// Add row `v` to the columns, or take it away.
-    fn change(&mut self, pair: &Pair<'_>, stride: usize, v: usize, add: bool) {
-        self.right_row.clear();
-        self.right_row.extend_from_slice(pair.right.row(v));
-        self.right_row.resize(pair.width + stride, 0);
-        let Self { columns, texture, right_row, .. } = self;
-        widest(Change { left: pair.left.row(v), right: right_row, columns, texture, stride, add });
+    /// Which rows enter the columns and leave them next.
+    fn exchange(&mut self, pair: &Pair<'_>, enters: Option<usize>, leaves: Option<usize>) {
+        let margin = pair.levels.next_multiple_of(LANES);
+        self.enters.take(pair, enters, margin);
+        self.leaves.take(pair, leaves, margin);
     }
 }
 
-/// The differences of a row, added to the columns or taken away.
-struct Change<'a> {
-    left: &'a [u8],
-    /// Mirrored: the candidates of rising disparity stand side by side.
-    right: &'a [u8],
+/// The columns' sums moved down by a row: one enters and one leaves.
+struct Exchange<'a> {
+    enters: &'a Line,
+    leaves: &'a Line,
     columns: &'a mut [u16],
     texture: &'a mut [u16],
     stride: usize,
-    add: bool,
 }
 
-impl Kernel for Change<'_> {
-    type Output = ();
+impl Exchange<'_> {
+    /// Move the column of pixel `u`, and `sums` of a window along with it: that column enters, and
+    /// the column of pixel `old` leaves.
     #[inline(always)]
-    fn run<B: Bytes>(self) {
-        let Self { left, right, columns, texture, stride, add } = self;
-        let width = left.len();
-        // Taking away is adding the negative, modulo 2¹⁶.
-        let sign = if add { 1_u16 } else { u16::MAX };
-        for (u, column) in columns.chunks_exact_mut(stride).enumerate() {
-            let grey = B::splat(left[u]);
-            let right = &right[width - 1 - u..width - 1 - u + stride];
-            for (block, sums) in column.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-                let there = B::load(right, block * LANES);
-                let difference = grey.minus(there).plus(there.minus(grey)).to_array();
-                for i in 0..LANES {
-                    sums[i] = sums[i].wrapping_add(u16::from(difference[i]).wrapping_mul(sign));
-                }
+    fn column<B: Bytes>(&mut self, u: usize, old: Option<usize>, sums: &mut [u16]) {
+        let Self { enters, leaves, stride, .. } = *self;
+        let at = enters.left.len() - 1 - u;
+        let (grey, gone) = (B::splat(enters.left[u]), B::splat(leaves.left[u]));
+        let (rights, rights_gone) = (&enters.right[at..at + stride], &leaves.right[at..at + stride]);
+        // The first column is that of no pixel.
+        let (before, from) = self.columns.split_at_mut((u + 1) * stride);
+        let column = from[..stride].as_chunks_mut::<LANES>().0;
+        let old = old.map_or(0, |old| old + 1) * stride;
+        let old = before[old..old + stride].as_chunks::<LANES>().0;
+        let lines = column.iter_mut().zip(sums.as_chunks_mut::<LANES>().0).zip(old);
+        for (block, ((column, sums), old)) in lines.enumerate() {
+            let new = difference(grey, B::load(rights, block * LANES));
+            let gone = difference(gone, B::load(rights_gone, block * LANES));
+            for i in 0..LANES {
+                let moved = column[i].wrapping_add(u16::from(new[i])).wrapping_sub(u16::from(gone[i]));
+                column[i] = moved;
+                sums[i] = sums[i].wrapping_add(moved).wrapping_sub(old[i]);
             }
         }
-        for (sum, &slope) in texture.iter_mut().zip(left) {
-            let slope = u16::from(slope.abs_diff(super::slopes::ZERO));
-            *sum = sum.wrapping_add(slope.wrapping_mul(sign));
+        let slope = |line: &Line| u16::from(line.left[u].abs_diff(ZERO));
+        self.texture[u] = self.texture[u].wrapping_add(slope(enters)).wrapping_sub(slope(leaves));
+    }
+}
+
+#[inline(always)]
+fn difference<B: Bytes>(a: B, b: B) -> [u8; LANES] {
+    a.minus(b).plus(b.minus(a)).to_array()
+}
+
+impl Kernel for Exchange<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<B: Bytes>(mut self) {
+        let mut sums = vec![0; self.stride];
+        for u in 0..self.texture.len() {
+            self.column::<B>(u, None, &mut sums);
         }
     }
 }
 
 /// The winner of each window of a row.
-struct Window<'a> {
-    columns: &'a [u16],
-    texture: &'a [u16],
-    stride: usize,
+struct Windows<'a> {
+    columns: Exchange<'a>,
+    sums: &'a mut [u16],
     radius: usize,
     levels: usize,
     uniqueness: f32,
     least_texture: f32,
     best: &'a mut [Winner],
-    /// Of every level, not of the winners alone: what the right image would answer.
-    claims: &'a mut Claims,
 }
 
-impl Kernel for Window<'_> {
+impl Kernel for Windows<'_> {
     type Output = ();
     #[inline(always)]
     fn run<B: Bytes>(self) {
-        let Self { columns, texture, stride, radius, levels, uniqueness, least_texture, best, claims } = self;
+        let Self { mut columns, sums, radius, levels, uniqueness, least_texture, best } = self;
         let width = best.len();
-        claims.start_row(width);
-        let mut sums = vec![0_u16; stride];
+        sums.fill(0);
         let mut slopes = 0_u16;
-        let column = |u: usize| &columns[u * stride..(u + 1) * stride];
-        for (u, &slope) in texture.iter().enumerate().take(radius) {
-            add(&mut sums, column(u));
-            slopes = slopes.wrapping_add(slope);
-        }
-        for (u, best) in best.iter_mut().enumerate() {
-            let enters = (u + radius < width).then(|| u + radius);
-            let leaves = u.checked_sub(radius + 1);
-            if let Some(u) = enters {
-                slopes = slopes.wrapping_add(texture[u]);
+        for u in 0..width + radius {
+            let old = u.checked_sub(2 * radius + 1);
+            if u < width {
+                columns.column::<B>(u, old, sums);
+                slopes = slopes.wrapping_add(columns.texture[u]);
+            } else if let Some(old) = old {
+                let stride = columns.stride;
+                for (sum, x) in sums.iter_mut().zip(&columns.columns[(old + 1) * stride..]) {
+                    *sum = sum.wrapping_sub(*x);
+                }
             }
-            if let Some(u) = leaves {
-                slopes = slopes.wrapping_sub(texture[u]);
-            }
-            match (enters, leaves) {
-                (Some(new), Some(old)) => exchange(&mut sums, column(new), column(old)),
-                (Some(new), None) => add(&mut sums, column(new)),
-                (None, Some(old)) => subtract(&mut sums, column(old)),
-                (None, None) => {}
-            }
+            slopes = slopes.wrapping_sub(old.map_or(0, |old| columns.texture[old]));
+            let Some(centre) = u.checked_sub(radius) else { continue };
             // Only levels whose match is inside the right image.
-            let inside = levels.min(u + 1);
+            let inside = levels.min(centre + 1);
             let textured = f32::from(slopes) >= least_texture;
-            *best = if textured { winner(&mut sums[..inside], uniqueness) } else { Winner::default() };
-            claim(&sums[..inside], &mut claims.0[width - 1 - u..]);
+            best[centre] = if textured { winner(&mut sums[..inside], uniqueness) } else { Winner::default() };
         }
     }
 }
 
-#[inline(always)]
-fn add(sums: &mut [u16], column: &[u16]) {
-    for (sum, x) in sums.iter_mut().zip(column) {
-        *sum = sum.wrapping_add(*x);
-    }
+/// Disparity of a winner to 1/16 pixel, and its standard deviation; `pixels` are those of a window.
+///
+/// About its minimum a sum of N absolute differences of Laplacian noise is C₀ + A δ², and the
+/// variance of the minimum C₀/(2 N A): the more the cost rises to either side, and the less remains
+/// of it, the surer.
+fn answer(winner: &Winner, pixels: f32) -> (f32, f32) {
+    let [before, here, after] = winner.costs;
+    // Beside the end of the levels the other side tells both.
+    let [before, after] =
+        [(before, after), (after, before)].map(|(own, other)| if own == NO_LEVEL { other } else { own });
+    let [before, here, after] = [before, here, after].map(f32::from);
+    let steeper = before.max(after) - here;
+    // Two lines of opposite slope: nearer to such a sum's shape than a parabola.
+    let offset = if steeper > 0.0 { 0.5 * (before - after) / steeper } else { 0.0 };
+    let shift = f32::from(winner.level) + offset;
+    // What would remain at the minimum itself.
+    let least = (here - 0.5 * (before - after).abs()).max(0.0);
+    let rise = (0.5 * (before + after) - least).max(1.0);
+    let variance = MISFIT * 0.5 * least * SMOOTHED_PIXELS / (pixels * rise);
+    let shift = (shift / RESOLUTION_PX).round() * RESOLUTION_PX;
+    (shift, (variance + RESOLUTION_PX * RESOLUTION_PX / 12.0 + MODEL_SIGMA_PX * MODEL_SIGMA_PX).sqrt())
 }
 
+/// Where `value` first stands in `sums`, looked for in whole vectors.
 #[inline(always)]
-fn subtract(sums: &mut [u16], column: &[u16]) {
-    for (sum, x) in sums.iter_mut().zip(column) {
-        *sum = sum.wrapping_sub(*x);
-    }
-}
-
-#[inline(always)]
-fn exchange(sums: &mut [u16], new: &[u16], old: &[u16]) {
-    for (sum, (new, old)) in sums.iter_mut().zip(new.iter().zip(old)) {
-        *sum = sum.wrapping_add(new.wrapping_sub(*old));
-    }
-}
-
-/// Claim each level's right pixel.
-#[inline(always)]
-fn claim(sums: &[u16], claims: &mut [u32]) {
-    for ((level, &cost), claim) in sums.iter().enumerate().zip(claims) {
-        *claim = (*claim).min(u32::from(cost) << 16 | level as u32);
-    }
+fn position(sums: &[u16], value: u16) -> usize {
+    let (blocks, rest) = sums.as_chunks::<LANES>();
+    let has = |block: &[u16; LANES]| block.iter().fold(0, |any, &sum| any | u16::from(sum == value)) > 0;
+    let before = blocks.iter().take_while(|block| !has(block)).count();
+    let within = blocks.get(before).map_or(rest, |block| block);
+    before * LANES + within.iter().position(|&sum| sum == value).unwrap_or(0)
 }
 
 /// The level of least cost; not unique where a rival comes near.
 #[inline(always)]
 fn winner(sums: &mut [u16], uniqueness: f32) -> Winner {
     let inside = sums.len();
-    let mut key = u32::MAX;
-    for (level, &cost) in sums.iter().enumerate() {
-        key = key.min(u32::from(cost) << 16 | level as u32);
-    }
-    let (level, cost) = ((key & 0xffff) as usize, (key >> 16) as u16);
+    let cost = sums.iter().copied().fold(u16::MAX, u16::min);
+    let level = position(sums, cost);
     let costs = [level.wrapping_sub(1), level, level + 1].map(|l| sums.get(l).copied());
     // The neighbours are no rivals.
     let beside = level.saturating_sub(1)..(level + 2).min(inside);

@@ -41,7 +41,7 @@ impl Claims {
 
     /// Whether the right pixel of left pixel `u` at `level` is claimed at that level, within
     /// `tolerance`; never outside the right image.
-    fn agree(&self, u: usize, level: u16, tolerance: usize) -> bool {
+    pub fn agree(&self, u: usize, level: u16, tolerance: usize) -> bool {
         let claim = self.0.get(self.0.len() - 1 - u + usize::from(level));
         claim.is_some_and(|&claim| usize::from((claim as u16).abs_diff(level)) <= tolerance)
     }

@@ -147,6 +147,8 @@ pub struct DisparityMatcher {
     right_slopes: slopes::Slopes,
     area: area::AreaCorrelation,
     winners: Vec<f32>,
+    /// Of the area correlation's winners.
+    sigma: Vec<f32>,
     speckles: speckles::Speckles,
     refinement: subpixel::Refinement,
 }
@@ -186,16 +188,20 @@ impl DisparityMatcher {
         let options = &self.options;
         let (size, range) = (options.speckle_size, options.speckle_range);
         self.speckles.remove(&mut self.winners, width, size, range);
-        match options.matcher {
-            Matcher::SemiGlobal => {
-                self.refinement.refine(left, right, &self.winners, options.refinement_steps.max(1));
-            }
-            Matcher::AreaCorrelation => self.refinement.judge(left, right, &self.winners),
+        if options.matcher == Matcher::SemiGlobal {
+            self.refinement.refine(left, right, &self.winners, options.refinement_steps.max(1));
         }
-        let rows = (map.shift.rows_mut()).zip(map.sigma.rows_mut());
-        rows.zip(self.refinement.rows()).for_each(|((to_shift, to_sigma), (shift, sigma))| {
+        let rows = map.shift.rows_mut().zip(map.sigma.rows_mut()).enumerate();
+        rows.for_each(|(v, (to_shift, to_sigma))| {
+            let row = v * width..(v + 1) * width;
+            let (shift, sigma) = match options.matcher {
+                Matcher::SemiGlobal => self.refinement.row(v),
+                Matcher::AreaCorrelation => (&self.winners[row.clone()], &self.sigma[row]),
+            };
             to_shift.copy_from_slice(shift);
-            to_sigma.copy_from_slice(sigma);
+            for (to_sigma, (sigma, shift)) in to_sigma.iter_mut().zip(sigma.iter().zip(shift)) {
+                *to_sigma = if shift.is_nan() { f32::NAN } else { *sigma };
+            }
             if options.fill {
                 fill::fill_row(to_shift, to_sigma, levels);
             }
@@ -225,7 +231,8 @@ impl DisparityMatcher {
             levels,
             options: &self.options.area,
         };
-        self.area.winners(&pair, &mut self.winners);
+        self.sigma.resize(self.winners.len(), f32::NAN);
+        self.area.winners(&pair, &mut self.winners, &mut self.sigma);
     }
 }
 

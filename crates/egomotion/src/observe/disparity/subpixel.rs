@@ -65,8 +65,6 @@ pub(super) struct Refinement {
 
 /// Every how many pixels the median over an image is taken of.
 const SAMPLING: usize = 61;
-/// Correction, in typical ones, from which on a pixel is worse than the others.
-const OUTLYING: f32 = 3.0;
 
 /// The median of the values that are numbers.
 fn median(values: impl Iterator<Item = f32>) -> Option<f32> {
@@ -106,34 +104,10 @@ impl Refinement {
         }
     }
 
-    /// How sure `given` is (row-major, NaN is missing), which stays the answer.
-    ///
-    /// What one step would correct is the error of `given`: its typical size adds to the standard
-    /// deviation of the step everywhere, its own where it is far more.
-    pub(super) fn judge(&mut self, left: &Image, right: &Image, given: &[f32]) {
-        self.refine(left, right, given, 1);
-        let (stride, width) = (self.stride(), self.width);
-        let rows = self.refined.chunks(stride).zip(given.chunks(width.max(1)));
-        let steps =
-            rows.flat_map(|(row, given)| row[RADIUS.0..].iter().zip(given).map(|(r, d)| (r - d).abs()));
-        let typical = 1.4826 * median(steps.step_by(SAMPLING)).unwrap_or(0.0);
-        let rows = self.refined.par_chunks_mut(stride).zip(self.sigma.par_chunks_mut(stride));
-        rows.zip(given.par_chunks(width.max(1))).for_each(|((refined, sigma), given)| {
-            let pixels = refined[RADIUS.0..].iter_mut().zip(&mut sigma[RADIUS.0..]);
-            for ((refined, sigma), &given) in pixels.zip(given) {
-                let step = (*refined - given).abs();
-                let error = if step > OUTLYING * typical { step } else { typical };
-                *sigma = (*sigma * *sigma + error * error).sqrt();
-                *refined = given;
-            }
-        });
-    }
-
-    /// The answer, row after row: disparity and standard deviation, NaN is missing.
-    pub(super) fn rows(&self) -> impl IndexedParallelIterator<Item = (&[f32], &[f32])> {
-        let inner = RADIUS.0..RADIUS.0 + self.width;
-        let rows = self.refined.par_chunks(self.stride()).zip(self.sigma.par_chunks(self.stride()));
-        rows.map(move |(refined, sigma)| (&refined[inner.clone()], &sigma[inner.clone()]))
+    /// Row `v` of the answer: disparity and standard deviation, NaN is missing.
+    pub(super) fn row(&self, v: usize) -> (&[f32], &[f32]) {
+        let row = v * self.stride() + RADIUS.0..v * self.stride() + RADIUS.0 + self.width;
+        (&self.refined[row.clone()], &self.sigma[row])
     }
 
     fn stride(&self) -> usize {
