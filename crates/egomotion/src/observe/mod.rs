@@ -2,7 +2,7 @@
 
 pub mod corners;
 pub mod disparity;
-mod dispatch;
+pub(crate) mod dispatch;
 pub mod flow;
 mod follow;
 pub mod observation;

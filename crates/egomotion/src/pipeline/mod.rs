@@ -2,6 +2,7 @@
 
 pub mod config;
 mod frame_pair;
+mod map_row;
 pub mod maps;
 pub mod solve;
 pub mod stereo;
