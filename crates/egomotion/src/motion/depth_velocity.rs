@@ -1,6 +1,6 @@
 //! VZ of one pixel by the paper's four methods, by the un-linearised (6), and as part of a rigid scene.
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2, Vector3, Vector4, Vector6};
+use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector4, Vector6};
 
 use crate::geometry::{Field, Gaussian, RigidMotion, StereoRig, Twist};
 use crate::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
@@ -172,10 +172,13 @@ pub fn exact_change(z_m: f64, after: &Field, u: f64, v: f64, rig: &StereoRig) ->
 pub struct RigidPrediction<'a> {
     rig: &'a StereoRig,
     motion: RigidMotion,
-    /// Covariance of (δtZ, δΩX, δΩY).
+    /// Covariance of δ, and of (δtZ, δΩX, δΩY).
+    motion_cov: Matrix6<f64>,
     cov: Matrix3<f64>,
-    /// Standard deviation of the offset of disparity, and (δtZ, δΩX, δΩY) per pixel of it.
-    offset: (f64, Vector3<f64>),
+    /// Standard deviation of the offset of disparity, δ per pixel of it, and (δtZ, δΩX, δΩY) of that.
+    offset_sigma_px: f64,
+    motion_by_offset: Vector6<f64>,
+    depth_by_offset: Vector3<f64>,
 }
 
 /// An unknown offset common to all disparities: what an imperfect calibration does to the rig.
@@ -201,12 +204,17 @@ impl<'a> RigidPrediction<'a> {
     pub fn new(phi: &Gaussian<6>, offset: DisparityOffset, rig: &'a StereoRig) -> Option<Self> {
         let twist = Twist::from_vector(&phi.mean);
         // exp(φ + dφ) = exp(J dφ) exp(φ).
-        let by_phi = twist.left_jacobian().fixed_rows::<3>(2).into_owned();
+        let by_phi = twist.left_jacobian();
+        let motion_cov = by_phi * phi.cov * by_phi.transpose();
+        let motion_by_offset = by_phi * offset.phi_per_px;
         phi.cov.iter().all(|v| v.is_finite()).then(|| Self {
             rig,
             motion: twist.exp(),
-            cov: by_phi * phi.cov * by_phi.transpose(),
-            offset: (offset.sigma_px, by_phi * offset.phi_per_px),
+            motion_cov,
+            cov: motion_cov.fixed_view::<3, 3>(2, 2).into(),
+            offset_sigma_px: offset.sigma_px,
+            motion_by_offset,
+            depth_by_offset: motion_by_offset.fixed_rows::<3>(2).into(),
         })
     }
 
@@ -218,6 +226,26 @@ impl<'a> RigidPrediction<'a> {
     /// Where a point measured as (x, y, d) goes: (x′, y′, d′); `None` behind the camera.
     pub fn moved(&self, xyd: &Vector3<f64>) -> Option<Vector3<f64>> {
         self.rig.project(&self.motion.apply(&self.rig.point(xyd)?))
+    }
+
+    /// Whether a flow, in image coordinates, is not that of the still world's point (x, y, d).
+    ///
+    /// It is not where it lies outside the ellipse that holds 99.7 % of what the noise of flow, of d
+    /// (`d_variance`), of φ and of the calibration make of that point.
+    pub fn contradicts_flow(&self, xyd: &Vector3<f64>, d_variance: f64, flow: &Gaussian<2>) -> bool {
+        let Some(predicted) = self.moved(xyd) else { return false };
+        let Some(p) = self.rig.point(&predicted) else { return false };
+        let apart = xyd.xy() + flow.mean - predicted.xy();
+        // P is in proportion to 1/d.
+        let by_d = self.rig.projected_change(&p, &((p - self.motion.translation) / -xyd.z)).xy();
+        let cov = flow.cov + by_d * by_d.transpose() * d_variance;
+        if !outside(&apart, &cov) {
+            return false;
+        }
+        let by_motion = self.rig.velocity_jacobian(&predicted).fixed_rows::<2>(0).into_owned();
+        let by_offset = (by_motion * self.motion_by_offset + by_d) * self.offset_sigma_px;
+        let by_phi = by_motion * self.motion_cov * by_motion.transpose();
+        outside(&apart, &(cov + by_phi + by_offset * by_offset.transpose()))
     }
 
     /// Z and VZ of the still world's point (x, y, d), from the noise `sigma_d` of d and that of φ.
@@ -238,11 +266,10 @@ impl<'a> RigidPrediction<'a> {
         let vz_by_d = (self.motion.translation.z - (moved.z - p.z)) * per_px;
         let var = sigma_d * sigma_d;
         // The offset moves φ and this pixel's own disparity together.
-        let (offset_sigma, motion_by_offset) = &self.offset;
+        let (offset_sigma, by_offset) = (self.offset_sigma_px, &self.depth_by_offset);
         let z_by_offset = z_by_d * offset_sigma;
-        let vz_by_offset = (motion_by_offset.x + moved.y * motion_by_offset.y - moved.x * motion_by_offset.z
-            + vz_by_d)
-            * offset_sigma;
+        let vz_by_offset =
+            (by_offset.x + moved.y * by_offset.y - moved.x * by_offset.z + vz_by_d) * offset_sigma;
         let cross = z_by_d * vz_by_d * var + z_by_offset * vz_by_offset;
         let cov = Matrix2::new(
             z_by_d * z_by_d * var + z_by_offset * z_by_offset,
@@ -252,6 +279,12 @@ impl<'a> RigidPrediction<'a> {
         );
         DepthVelocity { z_vz: Gaussian { mean: Vector2::new(p.z, moved.z - p.z), cov } }
     }
+}
+
+/// Whether eᵀ S⁻¹ e > χ²₂(0.997).
+fn outside(e: &Vector2<f64>, s: &Matrix2<f64>) -> bool {
+    let q = e.x * e.x * s.m22 - 2.0 * e.x * e.y * s.m12 + e.y * e.y * s.m11;
+    q > 11.83 * (s.m11 * s.m22 - s.m12 * s.m12)
 }
 
 /// vᵀ M v of v = (1, a, b) and a symmetric M.

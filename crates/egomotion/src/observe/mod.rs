@@ -13,6 +13,7 @@ mod row_search;
 pub mod sample;
 pub mod spline;
 pub mod stereo_pyramid;
+pub mod temporal_disparity;
 pub mod tracks;
 mod window;
 

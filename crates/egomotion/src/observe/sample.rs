@@ -43,7 +43,7 @@ impl DensePair<'_> {
 
     /// d at t with its variance where it is measured.
     #[inline(always)]
-    fn disparity(&self, u: usize, v: usize) -> Option<(f64, f64)> {
+    pub(crate) fn disparity(&self, u: usize, v: usize) -> Option<(f64, f64)> {
         let d = self.rig.disparity_from_shift(f64::from(self.before.shift.get(u, v)?));
         let sigma = f64::from(self.before.sigma.get(u, v).filter(|&sigma| sigma < GUESS_SIGMA_PX)?);
         (d > 0.0).then_some((d, sigma * sigma))
@@ -58,7 +58,7 @@ impl DensePair<'_> {
 
     /// The flow at a pixel in image coordinates.
     #[inline(always)]
-    fn displacement(&self, u: usize, v: usize) -> Option<Gaussian<2>> {
+    pub(crate) fn displacement(&self, u: usize, v: usize) -> Option<Gaussian<2>> {
         let Gaussian { mean, cov } = self.flow.get(u, v)?;
         let aspect = self.rig.aspect();
         let cross = aspect * cov.m12;

@@ -6,6 +6,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::config::{Approach, Config, Method};
+use super::moving::Moving;
 use crate::geometry::{Gaussian, StereoRig};
 use crate::motion::DepthVelocity;
 use crate::motion::depth_velocity::{self, RigidPrediction, contradict};
@@ -16,8 +17,8 @@ use crate::observe::dispatch::vectorised;
 /// What is known of the pixels of a row, one plane a quantity.
 #[derive(Debug, Clone)]
 pub(super) struct MapRow {
-    /// d, its σ², d′, its σ².
-    disparities: [Vec<f64>; 4],
+    /// d, its σ², d′, its σ², their covariance.
+    disparities: [Vec<f64>; 5],
     /// σ of d where it may be a guess: what the rigid prediction goes by.
     sigma: Vec<f64>,
     /// Z, VZ, their variances and their covariance.
@@ -49,6 +50,7 @@ impl MapRow {
         &mut self,
         pair: &DensePair<'_>,
         rigid: Option<&RigidPrediction<'_>>,
+        moving: Option<&Moving>,
         config: &Config,
         v: usize,
         dt_s: f64,
@@ -63,10 +65,17 @@ impl MapRow {
             }
             (_, Some(rigid)) => {
                 for u in 0..self.sigma.len() {
-                    self.set_disparities(u, pair.disparities(u, v));
-                    self.sigma[u] = f64::from(pair.before.sigma.row(v)[u]);
                     self.disparities[0][u] =
                         pair.rig.disparity_from_shift(f64::from(pair.before.shift.row(v)[u]));
+                    self.sigma[u] = f64::from(pair.before.sigma.row(v)[u]);
+                    match moving.and_then(|moving| moving.disparities(pair, u, v)) {
+                        // Then the rigid motion says nothing.
+                        Some(own) => {
+                            self.sigma[u] = f64::NAN;
+                            self.set_disparities(u, own);
+                        }
+                        None => self.set_disparities(u, pair.disparities(u, v)),
+                    }
                 }
                 unless_moving(rigid, (x, y), pair.rig, &self.disparities, &self.sigma, &mut self.velocity);
             }
@@ -91,9 +100,11 @@ impl MapRow {
     }
 
     fn set_disparities(&mut self, u: usize, disparities: Option<Gaussian<2>>) {
-        let nothing = || Gaussian::independent([f64::NAN; 2], [f64::NAN; 2]);
-        let Gaussian { mean, cov } = disparities.unwrap_or_else(nothing);
-        let values = [mean.x, cov.m11, mean.y, cov.m22];
+        let Some(Gaussian { mean, cov }) = disparities else {
+            self.disparities[2][u] = f64::NAN;
+            return;
+        };
+        let values = [mean.x, cov.m11, mean.y, cov.m22, cov.m12];
         for (plane, value) in self.disparities.iter_mut().zip(values) {
             plane[u] = value;
         }
@@ -155,25 +166,26 @@ unless_moving(
     rigid: &RigidPrediction<'_>,
     start: (f64, f64),
     rig: &StereoRig,
-    disparities: &[Vec<f64>; 4],
+    disparities: &[Vec<f64>; 5],
     sigma: &[f64],
     out: &mut [Vec<f64>; 5],
 ) {
     let n = sigma.len();
     let bf = rig.depth_disparity_product();
-    let [d, variance, later, later_variance] = disparities.each_ref().map(|plane| &plane[..n]);
+    let [d, variance, later, later_variance, shared] = disparities.each_ref().map(|plane| &plane[..n]);
     let [z, vz, z_variance, vz_variance, covariance] = out.each_mut().map(|plane| &mut plane[..n]);
     for u in 0..n {
         let point = Vector3::new(start.0 + u as f64, start.1, rig.focal_px) * (rig.baseline_m / d[u]);
         let still = rigid.depth_velocity_of(&point, d[u], sigma[u]);
-        let both = Gaussian { mean: Vector2::new(d[u], later[u]), cov: Matrix2::new(variance[u], 0.0, 0.0, later_variance[u]) };
+        let both = Gaussian { mean: Vector2::new(d[u], later[u]), cov: Matrix2::new(variance[u], shared[u], shared[u], later_variance[u]) };
         let measured = DepthVelocity::from_disparities(&both, bf);
         let (m, r) = (parts(&measured), parts(&still));
-        let behind = !(r[0] + r[1] > 0.0);
-        let take = contradict(&measured, &still) | behind;
+        let unknown = !(r[0] + r[1] > 0.0) | r[3].is_nan();
+        let take = contradict(&measured, &still) | unknown;
+        let known = (d[u] > 0.0) & !(if take { m[1] } else { r[1] }).is_nan();
         let pick = |k: usize| {
             let value = if take { m[k] } else { r[k] };
-            if d[u] > 0.0 { value } else { f64::NAN }
+            if known { value } else { f64::NAN }
         };
         (z[u], vz[u], z_variance[u], vz_variance[u], covariance[u]) =
             (pick(0), pick(1), pick(2), pick(3), pick(4));

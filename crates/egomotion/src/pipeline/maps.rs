@@ -3,13 +3,14 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::config::Config;
+use super::config::{Config, Method};
 use super::map_row::MapRow;
+use super::moving::Moving;
 use crate::estimate::Blocks;
 use crate::geometry::{Field, Grid, StereoRig};
 use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
 use crate::motion::impact::{Neighbourhood, TimeToImpact};
-use crate::observe::{DensePair, StereoTrack};
+use crate::observe::{DensePair, StereoPyramid, StereoTrack};
 
 /// Per-pixel results on the pixel grid of the earlier frame; missing pixels are NaN.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,15 +35,19 @@ const SPARSE_OBSTACLE_PX: f64 = 96.0;
 /// VZ and time to impact of every pixel, and the nearest obstacle's points by block.
 ///
 /// With `dcce` and `dv` VZ is that method's own measurement at each pixel; with the others it is
-/// the rigid scene's, except where the measured change of disparity contradicts it.
+/// the rigid scene's, except where flow or the measured change of disparity contradicts it: there it
+/// follows from the change of disparity. `images` are the two frames.
 pub fn motion_maps(
     pair: &DensePair<'_>,
+    images: (&StereoPyramid, &StereoPyramid),
     rigid: Option<&RigidPrediction<'_>>,
     config: &Config,
     dt_s: f64,
 ) -> (MotionMaps, Vec<Neighbourhood>) {
     let (width, height) = pair.flow.size();
     let blocks = Blocks::over(pair.rig, DENSE_OBSTACLE_PX);
+    let own = matches!(config.method, Method::Dcce | Method::Dv);
+    let moving = rigid.filter(|_| !own).map(|rigid| Moving::find(pair, images, rigid));
     let mut planes: [Grid<f32>; 5] = std::array::from_fn(|_| Grid::filled(width, height, 0.0));
     let [vz, sigma, impact, lo, hi] =
         planes.each_mut().map(|plane| plane.values_mut().par_chunks_mut(width.max(1)));
@@ -52,7 +57,7 @@ pub fn motion_maps(
         .map_init(
             || MapRow::new(width),
             |row, (v, (vz, sigma, impact, lo, hi))| {
-                row.fill(pair, rigid, config, v, dt_s, [vz, sigma, impact, lo, hi]);
+                row.fill(pair, rigid, moving.as_ref(), config, v, dt_s, [vz, sigma, impact, lo, hi]);
                 neighbourhoods(row, pair.rig, &blocks, v)
             },
         )
