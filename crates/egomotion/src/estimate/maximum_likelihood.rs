@@ -146,9 +146,6 @@ impl Search {
             let factor = (moved / last).min(0.5);
             let rest = moved * factor / (1.0 - factor);
             last = moved;
-            if std::env::var_os("TRACE").is_some() {
-                eprintln!("{} {moved:.2e} {:.6}", observations.len(), self.scale2);
-            }
             if rest <= kernel.tolerance * self.scale2.sqrt() {
                 return Ok((self, sums));
             }

@@ -170,14 +170,17 @@ impl Field {
     /// Bilinear value at (u, v); `None` outside, or where one of the pixels it needs is missing.
     #[inline(always)]
     pub fn sample(&self, u: f64, v: f64) -> Option<f64> {
-        let (values, weights) = self.0.corners(u, v)?;
-        let mut sum = 0.0;
-        for (value, w) in values.into_iter().zip(weights) {
-            if w > 0.0 {
-                sum += w * f64::from(value);
-            }
+        let (width, height) = self.size();
+        let inside = |c: f64, n: usize| c >= 0.0 && c <= n as f64 - 1.0;
+        if !(inside(u, width) && inside(v, height)) {
+            return None;
         }
-        Some(sum).filter(|s| !s.is_nan())
+        let (u0, v0) = (u as usize, v as usize);
+        let across = |v: usize| {
+            let row = self.row(v.min(height - 1));
+            blend(row[u0].into(), row[(u0 + 1).min(width - 1)].into(), u - u0 as f64)
+        };
+        Some(blend(across(v0), across(v0 + 1), v - v0 as f64)).filter(|value| !value.is_nan())
     }
 
     /// Bilinear value at (u, v), and central differences of such values one pixel each way; `None` outside, or
@@ -191,8 +194,6 @@ impl Field {
         }
         let (u0, v0) = (u as usize, v as usize);
         let (a, b) = (u - u0 as f64, v - v0 as f64);
-        // A pixel of weight zero may be missing, or lie outside.
-        let blend = |p: f64, q: f64, w: f64| if w > 0.0 { p + w * (q - p) } else { p };
         let across = |row: usize, from: usize| {
             let row = self.row((v0 + row - 1).min(height - 1));
             let value = |i: usize| f64::from(row[(u0 + from + i - 1).min(width - 1)]);
@@ -231,6 +232,12 @@ impl Field {
     pub fn density(&self) -> f64 {
         self.count() as f64 / self.0.values().len().max(1) as f64
     }
+}
+
+/// (1 − w) p + w q; q may be missing where its weight is zero.
+#[inline(always)]
+fn blend(p: f64, q: f64, w: f64) -> f64 {
+    if w > 0.0 { p + w * (q - p) } else { p }
 }
 
 #[cfg(test)]

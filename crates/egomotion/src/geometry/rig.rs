@@ -222,6 +222,16 @@ mod tests {
     }
 
     #[test]
+    fn velocities_move_the_projection() {
+        let p = Vector3::new(0.4, -0.3, 3.0);
+        let (t, w) = (Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.02, 0.05, -0.03));
+        let moved = rig().project_jacobian(&p) * (t + w.cross(&p));
+        let phi = nalgebra::Vector6::new(t.x, t.y, t.z, w.x, w.y, w.z);
+        let rates = rig().velocity_jacobian(&rig().project(&p).unwrap()) * phi;
+        assert!((rates - moved).norm() < 1e-12);
+    }
+
+    #[test]
     fn unusable_rigs_are_refused() {
         assert_eq!(StereoRig::new(0.0, (0.0, 0.0), 0.1, (4, 4)), Err(RigError::Focal(0.0)));
         assert_eq!(StereoRig::new(1.0, (0.0, 0.0), -0.1, (4, 4)), Err(RigError::Baseline(-0.1)));

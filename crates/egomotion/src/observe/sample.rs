@@ -32,13 +32,18 @@ impl DensePair<'_> {
     ) -> Vec<T> {
         let (width, height) = self.flow.size();
         let step = step.max(1);
-        (step / 2..height)
+        let rows: Vec<usize> = (step / 2..height).step_by(step).collect();
+        let found: Vec<Vec<T>> = rows
             .into_par_iter()
-            .step_by(step)
-            .flat_map_iter(|v| {
-                (step / 2..width).step_by(step).filter_map(|u| observe(self, u, v)).collect::<Vec<_>>()
+            .map(|v| {
+                let mut row = Vec::with_capacity(width.div_ceil(step));
+                row.extend((step / 2..width).step_by(step).filter_map(|u| observe(self, u, v)));
+                row
             })
-            .collect()
+            .collect();
+        let mut all = Vec::with_capacity(found.iter().map(Vec::len).sum());
+        found.into_iter().for_each(|row| all.extend(row));
+        all
     }
 
     /// d at t with its variance where it is measured.

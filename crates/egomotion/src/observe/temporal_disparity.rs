@@ -2,7 +2,7 @@
 //!
 //! The difference of two disparity maps adds the errors of both. Here the same window is followed in
 //! time by either camera: the left one sees it move by u_L, the right one by u_R, and the disparity
-//! changes by exactly u_L − u_R, (8). How a window is biased by the shape of its surface is the same
+//! changes by exactly u_L − u_R: the Δv of (9) over a finite interval. How a window is biased by the shape of its surface is the same
 //! before and after, and cancels.
 
 use super::patch::{Freedom, Patch, Settling};

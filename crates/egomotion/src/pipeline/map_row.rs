@@ -14,6 +14,32 @@ use crate::motion::impact::{TimeToImpact, VehicleWindow};
 use crate::observe::DensePair;
 use crate::observe::dispatch::vectorised;
 
+/// What the rows of a pair of frames share.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scene<'a> {
+    pub(super) pair: &'a DensePair<'a>,
+    pub(super) rigid: Option<&'a RigidPrediction<'a>>,
+    pub(super) moving: Option<&'a Moving>,
+    pub(super) config: &'a Config,
+    pub(super) dt_s: f64,
+}
+
+/// The rays of a row's pixels.
+#[derive(Debug, Clone, Copy)]
+struct Rays<'a> {
+    rig: &'a StereoRig,
+    /// Image coordinates of the row's first pixel.
+    start: (f64, f64),
+}
+
+impl Rays<'_> {
+    /// (x, y, f) of pixel `u`.
+    #[inline(always)]
+    fn at(&self, u: usize) -> Vector3<f64> {
+        Vector3::new(self.start.0 + u as f64, self.start.1, self.rig.focal_px)
+    }
+}
+
 /// What is known of the pixels of a row, one plane a quantity.
 #[derive(Debug, Clone)]
 pub(super) struct MapRow {
@@ -46,56 +72,45 @@ impl MapRow {
     }
 
     /// Row `v` of a pair of frames.
-    pub(super) fn fill(
-        &mut self,
-        pair: &DensePair<'_>,
-        rigid: Option<&RigidPrediction<'_>>,
-        moving: Option<&Moving>,
-        config: &Config,
-        v: usize,
-        dt_s: f64,
-        out: Output<'_>,
-    ) {
-        let (x, y) = pair.rig.image_from_pixel(0.0, v as f64);
+    pub(super) fn fill(&mut self, scene: &Scene<'_>, v: usize, out: Output<'_>) {
+        let &Scene { pair, rigid, config, dt_s, .. } = scene;
+        let rays = Rays { rig: pair.rig, start: pair.rig.image_from_pixel(0.0, v as f64) };
         match (config.method, rigid) {
             (Method::Dcce | Method::Dv, _) | (_, None) => {
-                for u in 0..self.sigma.len() {
+                for u in 0..self.width() {
                     self.set_velocity(u, measured(pair, config, u, v));
                 }
             }
             (_, Some(rigid)) => {
-                for u in 0..self.sigma.len() {
-                    self.disparities[0][u] =
-                        pair.rig.disparity_from_shift(f64::from(pair.before.shift.row(v)[u]));
-                    self.sigma[u] = f64::from(pair.before.sigma.row(v)[u]);
-                    match moving.and_then(|moving| moving.disparities(pair, u, v)) {
-                        // Then the rigid motion says nothing.
-                        Some(own) => {
-                            self.sigma[u] = f64::NAN;
-                            self.set_disparities(u, own);
-                        }
-                        None => self.set_disparities(u, pair.disparities(u, v)),
-                    }
+                for u in 0..self.width() {
+                    self.observe(scene, u, v);
                 }
-                unless_moving(rigid, (x, y), pair.rig, &self.disparities, &self.sigma, &mut self.velocity);
+                unless_moving(rigid, rays, &self.disparities, &self.sigma, &mut self.velocity);
             }
         }
         impacts(&self.velocity, dt_s, &mut self.looming, out);
         match rigid {
             Some(rigid) => {
-                let window = &config.window;
-                crossings(
-                    rigid,
-                    (x, y),
-                    pair.rig,
-                    window,
-                    dt_s,
-                    &self.velocity[0],
-                    &self.looming[0],
-                    &mut self.crosses,
-                );
+                let when = (&config.window, dt_s);
+                crossings(rigid, rays, when, &self.velocity[0], &self.looming[0], &mut self.crosses);
             }
             None => self.crosses.fill(false),
+        }
+    }
+
+    /// The disparities of one pixel.
+    #[inline(always)]
+    fn observe(&mut self, scene: &Scene<'_>, u: usize, v: usize) {
+        let pair = scene.pair;
+        self.disparities[0][u] = pair.rig.disparity_from_shift(f64::from(pair.before.shift.row(v)[u]));
+        self.sigma[u] = f64::from(pair.before.sigma.row(v)[u]);
+        match scene.moving.and_then(|moving| moving.disparities(pair, u, v)) {
+            // Then the rigid motion says nothing.
+            Some(own) => {
+                self.sigma[u] = f64::NAN;
+                self.set_disparities(u, own);
+            }
+            None => self.set_disparities(u, pair.disparities(u, v)),
         }
     }
 
@@ -161,27 +176,26 @@ fn whole([z, vz, z_variance, vz_variance, covariance]: [f64; 5]) -> DepthVelocit
 }
 
 vectorised! {
-/// The rigid prediction except where the measured change contradicts it; the row begins at (x, y).
+/// The rigid prediction except where the measured change contradicts it.
 unless_moving(
     rigid: &RigidPrediction<'_>,
-    start: (f64, f64),
-    rig: &StereoRig,
+    rays: Rays<'_>,
     disparities: &[Vec<f64>; 5],
     sigma: &[f64],
     out: &mut [Vec<f64>; 5],
 ) {
     let n = sigma.len();
-    let bf = rig.depth_disparity_product();
+    let (baseline, bf) = (rays.rig.baseline_m, rays.rig.depth_disparity_product());
     let [d, variance, later, later_variance, shared] = disparities.each_ref().map(|plane| &plane[..n]);
     let [z, vz, z_variance, vz_variance, covariance] = out.each_mut().map(|plane| &mut plane[..n]);
     for u in 0..n {
-        let point = Vector3::new(start.0 + u as f64, start.1, rig.focal_px) * (rig.baseline_m / d[u]);
+        let point = rays.at(u) * (baseline / d[u]);
         let still = rigid.depth_velocity_of(&point, d[u], sigma[u]);
         let both = Gaussian { mean: Vector2::new(d[u], later[u]), cov: Matrix2::new(variance[u], shared[u], shared[u], later_variance[u]) };
         let measured = DepthVelocity::from_disparities(&both, bf);
         let (m, r) = (parts(&measured), parts(&still));
-        let unknown = !(r[0] + r[1] > 0.0) | r[3].is_nan();
-        let take = contradict(&measured, &still) | unknown;
+        let predicted = (r[0] + r[1] > 0.0) & !r[3].is_nan();
+        let take = contradict(&measured, &still) | !predicted;
         let known = (d[u] > 0.0) & !(if take { m[1] } else { r[1] }).is_nan();
         let pick = |k: usize| {
             let value = if take { m[k] } else { r[k] };
@@ -222,22 +236,20 @@ impacts(velocity: &[Vec<f64>; 5], dt_s: f64, looming: &mut [Vec<f64>; 2], out: O
 }
 
 vectorised! {
-/// Which points will pass through the vehicle's window; the row begins at (x, y).
+/// Which points will pass through the vehicle's window.
 crossings(
     rigid: &RigidPrediction<'_>,
-    start: (f64, f64),
-    rig: &StereoRig,
-    window: &VehicleWindow,
-    dt_s: f64,
+    rays: Rays<'_>,
+    when: (&VehicleWindow, f64),
     z: &[f64],
     looming: &[f64],
     out: &mut [bool],
 ) {
     let n = z.len();
-    let (looming, out) = (&looming[..n], &mut out[..n]);
-    let (motion, per_focal, per_s) = (*rigid.motion(), rig.focal_px.recip(), dt_s.recip());
+    let ((window, dt_s), looming, out) = (when, &looming[..n], &mut out[..n]);
+    let (motion, per_focal, per_s) = (*rigid.motion(), rays.rig.focal_px.recip(), dt_s.recip());
     for u in 0..n {
-        let before = Vector3::new(start.0 + u as f64, start.1, rig.focal_px) * (z[u] * per_focal);
+        let before = rays.at(u) * (z[u] * per_focal);
         let later = motion.apply(&before);
         let velocity = (later - before) * per_s;
         out[u] = (looming[u] > 0.0) & window.is_crossed_by(&later, &velocity, looming[u].recip());

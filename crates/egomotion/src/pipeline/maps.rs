@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::config::{Config, Method};
-use super::map_row::MapRow;
+use super::map_row::{MapRow, Scene};
 use super::moving::Moving;
 use crate::estimate::Blocks;
 use crate::geometry::{Field, Grid, StereoRig};
@@ -48,6 +48,7 @@ pub fn motion_maps(
     let blocks = Blocks::over(pair.rig, DENSE_OBSTACLE_PX);
     let own = matches!(config.method, Method::Dcce | Method::Dv);
     let moving = rigid.filter(|_| !own).map(|rigid| Moving::find(pair, images, rigid));
+    let scene = Scene { pair, rigid, moving: moving.as_ref(), config, dt_s };
     let mut planes: [Grid<f32>; 5] = std::array::from_fn(|_| Grid::filled(width, height, 0.0));
     let [vz, sigma, impact, lo, hi] =
         planes.each_mut().map(|plane| plane.values_mut().par_chunks_mut(width.max(1)));
@@ -57,7 +58,7 @@ pub fn motion_maps(
         .map_init(
             || MapRow::new(width),
             |row, (v, (vz, sigma, impact, lo, hi))| {
-                row.fill(pair, rigid, moving.as_ref(), config, v, dt_s, [vz, sigma, impact, lo, hi]);
+                row.fill(&scene, v, [vz, sigma, impact, lo, hi]);
                 neighbourhoods(row, pair.rig, &blocks, v)
             },
         )
@@ -67,14 +68,11 @@ pub fn motion_maps(
         seen[block].seen += part.seen;
         seen[block].crossing.extend(part.crossing);
     }
-    let [depth_velocity, depth_velocity_sigma, impact, impact_lo, impact_hi] = planes;
-    let maps = MotionMaps {
-        depth_velocity: Field::from_grid(depth_velocity),
-        depth_velocity_sigma: Field::from_grid(depth_velocity_sigma),
-        impact: Field::from_grid(impact),
-        impact_lo: Field::from_grid(impact_lo),
-        impact_hi,
-    };
+    let [vz, sigma, impact, lo, impact_hi] = planes;
+    let fields = |a, b| rayon::join(|| Field::from_grid(a), || Field::from_grid(b));
+    let ((depth_velocity, depth_velocity_sigma), (impact, impact_lo)) =
+        rayon::join(|| fields(vz, sigma), || fields(impact, lo));
+    let maps = MotionMaps { depth_velocity, depth_velocity_sigma, impact, impact_lo, impact_hi };
     (maps, seen)
 }
 

@@ -153,3 +153,25 @@ fn change_at(
     let change = disparity_change(before, after, &seen, &expected)?;
     Some((d, Gaussian::scalar(change.value() / d, change.variance() / (d * d))))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ratio_of_disparities_is_surer_than_their_difference() {
+        let ratio = Gaussian::scalar(0.1, 1e-6);
+        let alone = joint((10.0, 0.04), &ratio, None);
+        assert!((alone.mean.y - 11.0).abs() < 1e-12);
+        // Var(ln d′/d) is that of the ratio: the error of d is shared.
+        let by = nalgebra::Vector2::new(-1.0 / alone.mean.x, 1.0 / alone.mean.y);
+        assert!((by.dot(&(alone.cov * by)) - 1e-6 / 1.21).abs() < 1e-12);
+        // A map that says the same changes nothing but the variances; one that lies far off is left out.
+        let map = |d: f64| Gaussian::independent([10.0, d], [0.04, 0.04]);
+        let same = joint((10.0, 0.04), &ratio, Some(&map(11.0)));
+        assert!((same.mean - alone.mean).norm() < 1e-12 && same.cov.m11 < alone.cov.m11);
+        let weights = (1.0 / (1.21 * 0.04 + 1e-4), 1.0 / 0.04);
+        assert!((same.cov.m22 - 1.0 / (weights.0 + weights.1)).abs() < 1e-12);
+        assert_eq!(joint((10.0, 0.04), &ratio, Some(&map(14.0))), alone);
+    }
+}

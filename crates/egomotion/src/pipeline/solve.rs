@@ -64,8 +64,8 @@ impl<'a> Solver<'a> {
         match observed {
             Observed::Sparse(tracks) => tracks.to_vec(),
             Observed::Dense(pair, tracks) => {
-                let mut all = tracks.to_vec();
-                all.extend(pair.every(self.config.sample_step_px, DensePair::stereo_track));
+                let mut all = pair.every(self.config.sample_step_px, DensePair::stereo_track);
+                all.extend_from_slice(tracks);
                 all
             }
         }
