@@ -38,7 +38,8 @@ impl Blocks {
     /// The block of image coordinates (x, y); outside the image, the nearest one.
     pub fn index(&self, x: f64, y: f64) -> usize {
         let cell = |c: f64, origin: f64, n: usize| {
-            (((c - origin) / self.size_px).floor().max(0.0) as usize).min(n - 1)
+            // The conversion rounds down, and takes what is negative to zero.
+            (((c - origin) / self.size_px) as usize).min(n - 1)
         };
         cell(y, self.origin_px.1, self.rows) * self.columns + cell(x, self.origin_px.0, self.columns)
     }

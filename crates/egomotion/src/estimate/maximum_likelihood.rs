@@ -6,7 +6,7 @@
 //! motion is legal because S, never the measurement's covariance alone, is inverted. Robust
 //! weights are those of Student's t on q = eᵀ S⁻¹ e.
 
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::{Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,9 @@ use super::alignment::{Form, Moments, PointPair};
 use super::blocks::{self, BlockScore, Blocks};
 use super::lmeds::{random_subsets, trials};
 use super::m_estimator::{LEAST_SCALE2, StudentT};
-use super::measurement::{At, Linearised, Measurement, product};
+use super::measurement::{At, Measurement};
+use super::step::{Step, Sums, Weighing};
+use super::systematic::CommonErrors;
 use super::{Estimate, MotionEstimate, Observability, Unsolvable, median};
 use crate::geometry::{Gaussian, StereoRig, Twist};
 use crate::observe::StereoTrack;
@@ -50,52 +52,6 @@ impl Default for MaximumLikelihoodOptions {
     }
 }
 
-/// The sums of one Gauss–Newton step.
-#[derive(Debug, Clone, Copy, Default)]
-struct Step {
-    score: BlockScore<6>,
-    bread: Matrix6<f64>,
-    weighted_square: f64,
-    square: f64,
-    used: usize,
-    inliers: usize,
-}
-
-impl Step {
-    fn add(&mut self, l: &Linearised, kernel: &StudentT, scale2: f64) {
-        let inverse = l.inverse_cov;
-        let q = l.misclosure.dot(&(inverse * l.misclosure));
-        let weight = kernel.weight(q / scale2, 3.0);
-        let weighted = product(&l.by_phi.transpose(), &inverse);
-        let (information, score) = (product(&weighted, &l.by_phi), product(&weighted, &l.misclosure));
-        self.score.information += weight * information;
-        self.score.score += weight * score;
-        self.bread += weight * information
-            - kernel.curvature(q / scale2, 3.0) / scale2 * product(&score, &score.transpose());
-        self.weighted_square += weight * q;
-        self.square += q;
-        self.used += 1;
-        self.inliers += usize::from(q <= INLIER_Q * scale2);
-    }
-
-    fn merged(mut self, other: &Self) -> Self {
-        self.score.information += other.score.information;
-        self.score.score += other.score.score;
-        self.bread += other.bread;
-        self.weighted_square += other.weighted_square;
-        self.square += other.square;
-        self.used += other.used;
-        self.inliers += other.inliers;
-        self
-    }
-}
-
-/// Squared misclosure, in units of its scaled covariance, beyond which an observation is no inlier: χ²₃(0.99).
-const INLIER_Q: f64 = 11.345;
-
-/// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
-const STRIP: usize = 512;
-
 /// A maximum-likelihood estimate with what tests and studies ask of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaximumLikelihood {
@@ -103,6 +59,8 @@ pub struct MaximumLikelihood {
     pub motion: MotionEstimate,
     /// Σ eᵀ S⁻¹ e at the estimate, without robust weights.
     pub cost: f64,
+    /// How φ̂ answers to errors that all observations share; `None` where some direction is not determined.
+    pub common: Option<CommonErrors>,
 }
 
 /// Maximise the likelihood from a start.
@@ -120,55 +78,98 @@ pub fn maximum_likelihood<M: Measurement>(
     blocks: Option<&Blocks>,
     kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
-    let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
-    let mut phi = *start;
-    let mut scale2 = if kernel.nu.is_infinite() {
-        1.0
+    let mut search = Search { phi: *start, scale2: 1.0 };
+    let stride = observations.len() / COARSE;
+    if stride > 1 {
+        let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
+        search.begin(&few, rig, kernel)?;
+        // Few observations may leave open what all determine.
+        search = search.settle(&few, rig, None, kernel).map_or(search, |(found, _)| found);
     } else {
-        robust_scale2(observations, &phi, rig).ok_or(Unsolvable::FewRows { rows: 0, needed: 3 })?
-    };
-    for _ in 0..kernel.iterations {
-        let at = At::new(phi, rig);
-        let step = sums(observations, &mut structures, &at, kernel, scale2);
-        if step.used < 3 {
-            return Err(Unsolvable::FewRows { rows: step.used, needed: 3 });
-        }
-        let observability = Observability::of(&step.score.information)?;
-        let delta = observability.solve(&step.score.information, &step.score.score)?;
-        phi = Twist::from_vector(&(phi.vector() + delta));
-        if !kernel.nu.is_infinite() {
-            scale2 = (step.weighted_square / (3 * step.used) as f64).max(LEAST_SCALE2);
-        }
-        let moved = delta.dot(&(step.score.information * delta)).max(0.0).sqrt();
-        if moved <= kernel.tolerance * scale2.sqrt() {
-            return finish(observations, &mut structures, &At::new(phi, rig), blocks, kernel, scale2);
-        }
+        search.begin(observations, rig, kernel)?;
     }
-    Err(Unsolvable::NotConverged)
+    let (found, sums) = search.settle(observations, rig, blocks, kernel)?;
+    finish(&found, &sums, observations.len(), blocks)
 }
 
-fn sums<M: Measurement>(
-    observations: &[M],
-    structures: &mut [Vector3<f64>],
-    at: &At<'_>,
-    kernel: &StudentT,
+/// About so many observations bring the iteration near its end before all of them are used.
+const COARSE: usize = 4096;
+
+/// Where the iteration is.
+#[derive(Debug, Clone, Copy)]
+struct Search {
+    phi: Twist,
+    /// Squared scale of the misclosures in units of their stated covariance.
     scale2: f64,
-) -> Step {
-    let strips: Vec<Step> = observations
-        .par_chunks(STRIP)
-        .zip(structures.par_chunks_mut(STRIP))
-        .map(|(observations, structures)| {
-            let mut step = Step::default();
-            for (observation, structure) in observations.iter().zip(structures) {
-                if let Some(l) = observation.linearise(structure, at) {
-                    step.add(&l, kernel, scale2);
-                }
-            }
-            step
-        })
-        .collect();
-    strips.iter().fold(Step::default(), Step::merged)
 }
+
+impl Search {
+    /// A robust first scale.
+    fn begin<M: Measurement>(
+        &mut self,
+        observations: &[M],
+        rig: &StereoRig,
+        kernel: &StudentT,
+    ) -> Result<(), Unsolvable> {
+        if kernel.nu.is_finite() {
+            self.scale2 = robust_scale2(observations, &self.phi, rig)
+                .ok_or(Unsolvable::FewRows { rows: 0, needed: 3 })?;
+        }
+        Ok(())
+    }
+
+    /// Iterate until φ moves by less than the tolerance; with the sums of the last step.
+    fn settle<M: Measurement>(
+        mut self,
+        observations: &[M],
+        rig: &StereoRig,
+        blocks: Option<&Blocks>,
+        kernel: &StudentT,
+    ) -> Result<(Self, Sums), Unsolvable> {
+        let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
+        let mut last = 0.0;
+        for _ in 0..kernel.iterations {
+            let at = At::new(self.phi, rig);
+            let weighing = Weighing { blocks, kernel, scale2: self.scale2 };
+            let sums = Sums::over(observations, &mut structures, &at, &weighing);
+            let step = &sums.whole;
+            if step.used < 3 {
+                return Err(Unsolvable::FewRows { rows: step.used, needed: 3 });
+            }
+            let delta = direction(step)?;
+            self.phi = Twist::from_vector(&(self.phi.vector() + delta));
+            if kernel.nu.is_finite() {
+                self.scale2 = step.scale2().max(LEAST_SCALE2);
+            }
+            let moved = delta.dot(&(step.score.information * delta)).max(0.0).sqrt();
+            // Steps that shrink by a factor are followed by ones that sum up to this.
+            let factor = (moved / last).min(0.5);
+            let rest = moved * factor / (1.0 - factor);
+            last = moved;
+            if rest <= kernel.tolerance * self.scale2.sqrt() {
+                return Ok((self, sums));
+            }
+        }
+        Err(Unsolvable::NotConverged)
+    }
+}
+
+/// The step of φ: Newton's, with the weights' own change, near the end; Gauss–Newton's elsewhere.
+fn direction(step: &Step) -> Result<Vector6<f64>, Unsolvable> {
+    let (information, score) = (&step.score.information, &step.score.score);
+    let observability = Observability::of(information)?;
+    let plain = observability.solve(information, score)?;
+    if observability.rank() < 6 {
+        return Ok(plain);
+    }
+    let newton = step.bread().cholesky().map(|bread| bread.solve(score));
+    // Far from the end the likelihood may be flat in some direction, and Newton's step too long.
+    let length = |v: &Vector6<f64>| v.dot(&(information * v));
+    Ok(newton.filter(|newton| length(newton) <= LONGEST.powi(2) * length(&plain)).unwrap_or(plain))
+}
+
+/// Newton's step is taken unless so many times as long as Gauss–Newton's.
+const LONGEST: f64 = 3.0;
 
 /// A robust first scale of q: its median over that of χ²₃, with the structure as measured.
 pub(super) fn robust_scale2<M: Measurement>(observations: &[M], phi: &Twist, rig: &StereoRig) -> Option<f64> {
@@ -183,40 +184,33 @@ fn sampson<M: Measurement>(observation: &M, at: &At<'_>) -> Option<f64> {
     Some(l.misclosure.dot(&(l.inverse_cov * l.misclosure)))
 }
 
-fn finish<M: Measurement>(
-    observations: &[M],
-    structures: &mut [Vector3<f64>],
-    at: &At<'_>,
+/// The answer from the sums of the last step, which was less than the tolerance.
+fn finish(
+    found: &Search,
+    sums: &Sums,
+    rows: usize,
     blocks: Option<&Blocks>,
-    kernel: &StudentT,
-    scale2: f64,
 ) -> Result<MaximumLikelihood, Unsolvable> {
-    let mut per_block = vec![Step::default(); blocks.map_or(1, Blocks::count)];
-    for (observation, structure) in observations.iter().zip(structures) {
-        let (x, y) = observation.position();
-        if let Some(l) = observation.linearise(structure, at) {
-            per_block[blocks.map_or(0, |b| b.index(x, y))].add(&l, kernel, scale2);
-        }
-    }
-    let whole = per_block.iter().fold(Step::default(), Step::merged);
+    let whole = &sums.whole;
     let observability = Observability::of(&whole.score.information)?;
     let cov = match blocks {
         Some(_) => {
-            let scores: Vec<BlockScore<6>> = per_block.iter().map(|step| step.score).collect();
-            blocks::covariance(&scores, whole.bread.try_inverse().as_ref(), &observability)
+            let scores: Vec<BlockScore<6>> = sums.by_block.iter().map(|step| step.score).collect();
+            blocks::covariance(&scores, whole.bread().try_inverse().as_ref(), &observability)
         }
         None => blocks::model_covariance(1.0, &observability),
     };
     let freedom = (3 * whole.used).saturating_sub(6).max(1) as f64;
     Ok(MaximumLikelihood {
         motion: Estimate {
-            theta: Gaussian { mean: observability.known(&at.phi.vector()), cov },
+            theta: Gaussian { mean: observability.known(&found.phi.vector()), cov },
             observed: observability.observed(),
-            rows: observations.len(),
+            rows,
             inliers: whole.inliers,
             residual_scale: (whole.weighted_square / freedom).sqrt(),
         },
         cost: whole.square,
+        common: CommonErrors::of(whole),
     })
 }
 
@@ -274,8 +268,9 @@ pub fn cramer_rao_bound<M: Measurement>(
     let at = At::new(*phi, rig);
     let gaussian = StudentT { nu: f64::INFINITY, ..StudentT::default() };
     let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
-    let step = sums(observations, &mut structures, &at, &gaussian, 1.0);
-    let observability = Observability::of(&step.score.information).ok()?;
+    let weighing = Weighing { blocks: None, kernel: &gaussian, scale2: 1.0 };
+    let sums = Sums::over(observations, &mut structures, &at, &weighing);
+    let observability = Observability::of(&sums.whole.score.information).ok()?;
     let observed: [bool; 6] = observability.observed();
     observed.iter().all(|&o| o).then(|| blocks::model_covariance(1.0, &observability))
 }

@@ -1,7 +1,9 @@
 //! Observations as three equations between what was measured and φ, linearised with their structure eliminated.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector4};
+use nalgebra::{ArrayStorage, Matrix3, Matrix6, SMatrix, Vector3, Vector4};
 
+use super::step::{self, Step, Weighing};
+use crate::geometry::gaussian::{accumulate, product};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::{StereoFlow, StereoTrack};
 
@@ -10,65 +12,51 @@ use crate::observe::{StereoFlow, StereoTrack};
 pub struct At<'a> {
     pub(super) phi: Twist,
     motion: RigidMotion,
-    left_jacobian: Matrix6<f64>,
     rig: &'a StereoRig,
 }
 
 impl<'a> At<'a> {
     /// Linearise about φ.
     pub fn new(phi: Twist, rig: &'a StereoRig) -> Self {
-        Self { motion: phi.exp(), left_jacobian: phi.left_jacobian(), phi, rig }
+        Self { motion: phi.exp(), phi, rig }
     }
 }
 
-/// Misclosure e of an observation, the inverse of its covariance S, and −∂e/∂φ.
+/// Misclosure e of an observation, the inverse of its covariance S, and how e changes.
 #[derive(Debug, Clone, Copy)]
 pub struct Linearised {
     pub(super) misclosure: Vector3<f64>,
     pub(super) inverse_cov: Matrix3<f64>,
-    pub(super) by_phi: SMatrix<f64, 3, 6>,
-}
-
-/// A B, in place of the library's product for matrices of any size, which costs twice as much for those as small as here.
-#[inline(always)]
-pub(super) fn product<const N: usize, const K: usize, const M: usize>(
-    a: &SMatrix<f64, N, K>,
-    b: &SMatrix<f64, K, M>,
-) -> SMatrix<f64, N, M> {
-    let mut out = [[0.0; N]; M];
-    // Stored by columns.
-    let (a, b) = (&a.data.0, &b.data.0);
-    for m in 0..M {
-        for k in 0..K {
-            for n in 0..N {
-                out[m][n] += a[k][n] * b[m][k];
-            }
-        }
-    }
-    SMatrix::from_data(nalgebra::ArrayStorage(out))
+    /// −∂e/∂δ, where δ is the small motion of [`Measurement::by_phi`].
+    pub(super) by_motion: SMatrix<f64, 3, 6>,
+    /// ∂e per pixel by which every disparity is too large, before and after.
+    pub(super) by_offset: Vector3<f64>,
 }
 
 /// S⁻¹ by S = L D Lᵀ; `None` unless S is positive definite, which rounding or a careless caller may break.
 ///
 /// Where one quantity is known far better than another, cofactors would lose it in rounding.
+#[inline(always)]
 fn inverse(s: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    let (l21, l31) = (s.m12 / s.m11, s.m13 / s.m11);
+    let i1 = s.m11.recip();
+    let (l21, l31) = (s.m12 * i1, s.m13 * i1);
     let d2 = s.m22 - l21 * s.m12;
     let rest = s.m23 - l31 * s.m12;
-    let l32 = rest / d2;
+    let i2 = d2.recip();
+    let l32 = rest * i2;
     let d3 = s.m33 - l31 * s.m13 - l32 * rest;
     if !(s.m11 > 0.0 && d2 > 0.0 && d3 > 0.0) {
         return None;
     }
     // L⁻¹ has the rows (1), (a, 1), (c, b, 1).
     let (a, b, c) = (-l21, -l32, l21 * l32 - l31);
-    let (i1, i2, i3) = (s.m11.recip(), d2.recip(), d3.recip());
+    let i3 = d3.recip();
     let (m12, m13, m23) = (a * i2 + c * b * i3, c * i3, b * i3);
     Some(Matrix3::new(i1 + a * a * i2 + c * c * i3, m12, m13, m12, i2 + b * b * i3, m23, m13, m23, i3))
 }
 
 /// An observation that maximum likelihood can use.
-pub trait Measurement: Sync {
+pub trait Measurement: Copy + Send + Sync {
     /// Image coordinates (x, y), in pixels, to find the observation's block.
     fn position(&self) -> (f64, f64);
     /// First value (x, y, d) of the structure.
@@ -77,10 +65,16 @@ pub trait Measurement: Sync {
     fn linearise(&self, structure: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised>;
     /// How far the point moves in the left image, in pixels.
     fn displacement_px(&self) -> f64;
-    /// The same observation with every disparity larger by so many pixels.
-    fn with_disparity_offset(&self, px: f64) -> Self
-    where
-        Self: Sized;
+    /// The sums of consecutive observations, one for each run of them that lies in one block.
+    fn sums(
+        observations: &[Self],
+        structures: &mut [Vector3<f64>],
+        at: &At<'_>,
+        weighing: &Weighing<'_>,
+    ) -> Vec<(usize, Step)>;
+    /// ∂δ/∂φ of the small motion δ by which observations of this kind are linearised: it is the same for
+    /// all of them, so it is applied to sums.
+    fn by_phi(at: &At<'_>) -> Matrix6<f64>;
 }
 
 /// How far a structure may move from where it was measured, in standard deviations.
@@ -103,36 +97,56 @@ impl Measurement for StereoTrack {
         self.before.mean
     }
 
+    #[inline(always)]
     fn linearise(&self, s: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised> {
-        let moved = at.motion.apply(&at.rig.point(s)?);
-        let by_moved = at.rig.project_jacobian(&moved);
-        let by_structure = product(&product(&by_moved, &at.motion.rotation), &at.rig.point_jacobian(s));
+        let point = at.rig.point(s)?;
+        let (turn, from) = (&at.motion.rotation, &at.motion.translation);
+        let moved = at.motion.apply(&point);
         let predicted = at.rig.project(&moved)?;
-        let misclosure = self.after.mean - predicted - by_structure * (self.before.mean - *s);
+        // (X, Y, Z) is (x, y, f) b/d.
+        let k = at.rig.baseline_m / s.z;
+        let column = |x: f64, y: f64, z: f64| at.rig.projected_change(&moved, &Vector3::new(x, y, z)).into();
+        let by_structure = Matrix3::from_data(ArrayStorage([
+            column(turn.m11 * k, turn.m21 * k, turn.m31 * k),
+            column(turn.m12 * k, turn.m22 * k, turn.m32 * k),
+            {
+                let per_px = -s.z.recip();
+                column((moved.x - from.x) * per_px, (moved.y - from.y) * per_px, (moved.z - from.z) * per_px)
+            },
+        ]));
+        let misclosure = self.after.mean - predicted - product(&by_structure, &(self.before.mean - *s));
         let gain = product(&self.before.cov, &by_structure.transpose());
-        let cov = self.after.cov + product(&by_structure, &gain);
+        let mut cov = self.after.cov;
+        accumulate(&mut cov, &by_structure, &gain);
         let inverse_cov = inverse(&cov)?;
-        let pull = inverse_cov * misclosure;
-        let shift = gain * pull;
-        let improved = self.before.mean + shift * restraint(pull.dot(&(by_structure * shift)));
+        let pull = product(&inverse_cov, &misclosure);
+        let shift = product(&gain, &pull);
+        let improved = self.before.mean + shift * restraint(pull.dot(&product(&by_structure, &shift)));
         // A first guess may be wild; a structure must stay in front of the camera.
         if improved.z > 0.1 * s.z {
             *s = improved;
         }
-        let by_motion = product(&by_moved, &RigidMotion::point_jacobian(&moved));
-        let by_phi = product(&by_motion, &at.left_jacobian);
-        Some(Linearised { misclosure, inverse_cov, by_phi })
+        let by_motion = at.rig.velocity_jacobian(&predicted);
+        let by_offset = Vector3::z() - by_structure.column(2);
+        Some(Linearised { misclosure, inverse_cov, by_motion, by_offset })
+    }
+
+    /// Motions are composed: exp(φ + dφ) = exp(δ) exp(φ).
+    fn by_phi(at: &At<'_>) -> Matrix6<f64> {
+        at.phi.left_jacobian()
+    }
+
+    fn sums(
+        observations: &[Self],
+        structures: &mut [Vector3<f64>],
+        at: &At<'_>,
+        weighing: &Weighing<'_>,
+    ) -> Vec<(usize, Step)> {
+        step::of_tracks(observations, structures, at, weighing)
     }
 
     fn displacement_px(&self) -> f64 {
         (self.after.mean - self.before.mean).xy().norm()
-    }
-
-    fn with_disparity_offset(&self, px: f64) -> Self {
-        let mut shifted = *self;
-        shifted.before.mean.z += px;
-        shifted.after.mean.z += px;
-        shifted
     }
 }
 
@@ -162,11 +176,6 @@ impl Measurement for StereoFlow {
         let predicted = scaled * d + turned;
         let rate = Vector3::new(0.0, 0.0, scaled.z + turned.z / d);
         let by_d = scaled + rate;
-        let z = bf / d;
-        let mut by_phi = SMatrix::<f64, 3, 6>::zeros();
-        by_phi.row_mut(0).copy_from_slice(&[f / z, 0.0, -x / z, -x * y / f, f + x * x / f, -y]);
-        by_phi.row_mut(1).copy_from_slice(&[0.0, f / z, -y / z, -(f + y * y / f), x * y / f, x]);
-        by_phi.row_mut(2).copy_from_slice(&[0.0, 0.0, -d / z, -y * d / f, x * d / f, 0.0]);
         // (d, v_x, v_y, v_x right) → (v_x, v_y, Δv) − prediction's change with d.
         let measured = &self.measured.mean;
         let flow = Vector3::new(measured[1], measured[2], measured[1] - measured[3]);
@@ -184,16 +193,25 @@ impl Measurement for StereoFlow {
         if improved > 0.1 * d {
             s.z = improved;
         }
-        Some(Linearised { misclosure, inverse_cov, by_phi })
+        let by_motion = at.rig.velocity_jacobian(&Vector3::new(x, y, d));
+        Some(Linearised { misclosure, inverse_cov, by_motion, by_offset: -by_d })
+    }
+
+    /// Velocities add up.
+    fn by_phi(_: &At<'_>) -> Matrix6<f64> {
+        Matrix6::identity()
+    }
+
+    fn sums(
+        observations: &[Self],
+        structures: &mut [Vector3<f64>],
+        at: &At<'_>,
+        weighing: &Weighing<'_>,
+    ) -> Vec<(usize, Step)> {
+        step::of_flows(observations, structures, at, weighing)
     }
 
     fn displacement_px(&self) -> f64 {
         self.measured.mean.fixed_rows::<2>(1).norm()
-    }
-
-    fn with_disparity_offset(&self, px: f64) -> Self {
-        let mut shifted = *self;
-        shifted.measured.mean[0] += px;
-        shifted
     }
 }

@@ -9,6 +9,7 @@ pub mod maximum_likelihood;
 pub mod measurement;
 pub mod observability;
 pub mod row;
+mod step;
 pub mod systematic;
 pub mod two_step;
 

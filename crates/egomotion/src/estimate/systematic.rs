@@ -4,12 +4,13 @@
 //! match a little the same way, and an unknown *offset of disparity*, by which the rig's calibration
 //! is wrong. Their effect on φ̂ follows from the normal equations: δφ = A⁻¹ Σ Gᵀ S⁻¹ δe.
 
-use nalgebra::{Matrix6, SMatrix, Vector6};
+use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
 
 use super::Observability;
 use super::m_estimator::StudentT;
 use super::maximum_likelihood::robust_scale2;
-use super::measurement::{At, Measurement, product};
+use super::measurement::{At, Measurement};
+use super::step::{Step, Sums, Weighing};
 use crate::geometry::{StereoRig, Twist};
 
 /// How φ̂ answers to errors common to all observations.
@@ -25,14 +26,23 @@ pub struct CommonErrors {
 }
 
 impl CommonErrors {
+    /// δφ = A⁻¹ Σ Gᵀ S⁻¹ δe; `None` where some direction is not determined.
+    pub(super) fn of(step: &Step) -> Option<Self> {
+        let information = &step.score.information;
+        let observability = Observability::of(information).ok()?;
+        let complete = observability.observed::<6>().iter().all(|&o| o);
+        let solved = information.cholesky()?.solve(&step.shared);
+        complete.then(|| Self {
+            by_localisation: solved.fixed_view::<6, 3>(0, 0).into(),
+            by_disparity_offset: solved.fixed_view::<6, 1>(0, 3).into(),
+        })
+    }
+
     /// Covariance of φ that a localisation bias of standard deviation `sigma_px` in each of (x, y, d) adds.
     pub fn localisation_covariance(&self, sigma_px: f64) -> Matrix6<f64> {
         sigma_px * sigma_px * self.by_localisation * self.by_localisation.transpose()
     }
 }
-
-/// Step of the numerical derivative by the offset of disparity, in pixels.
-const OFFSET_STEP_PX: f64 = 1e-3;
 
 /// The response of the maximum-likelihood estimate at φ, with the structure as measured; `None` where some direction is not determined.
 pub fn common_errors<M: Measurement>(
@@ -43,29 +53,9 @@ pub fn common_errors<M: Measurement>(
 ) -> Option<CommonErrors> {
     let at = At::new(*phi, rig);
     let scale2 = if kernel.nu.is_infinite() { 1.0 } else { robust_scale2(observations, phi, rig)? };
-    let mut information = Matrix6::zeros();
-    let mut response = SMatrix::<f64, 6, 4>::zeros();
-    for observation in observations {
-        let Some(l) = observation.linearise(&mut observation.structure(), &at) else { continue };
-        let shifted = observation.with_disparity_offset(OFFSET_STEP_PX);
-        let Some(s) = shifted.linearise(&mut shifted.structure(), &at) else { continue };
-        let inverse = l.inverse_cov;
-        let weight = kernel.weight(l.misclosure.dot(&(inverse * l.misclosure)) / scale2, 3.0);
-        let weighted = weight * product(&l.by_phi.transpose(), &inverse);
-        information += product(&weighted, &l.by_phi);
-        let share = observation.displacement_px().min(1.0);
-        let mut localisation = response.fixed_view_mut::<6, 3>(0, 0);
-        localisation += share * weighted;
-        let mut offset = response.fixed_view_mut::<6, 1>(0, 3);
-        offset += weighted * (s.misclosure - l.misclosure) / OFFSET_STEP_PX;
-    }
-    let observability = Observability::of(&information).ok()?;
-    let complete = observability.observed::<6>().iter().all(|&o| o);
-    let solved = information.cholesky()?.solve(&response);
-    complete.then(|| CommonErrors {
-        by_localisation: solved.fixed_view::<6, 3>(0, 0).into(),
-        by_disparity_offset: solved.fixed_view::<6, 1>(0, 3).into(),
-    })
+    let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
+    let weighing = Weighing { blocks: None, kernel, scale2 };
+    CommonErrors::of(&Sums::over(observations, &mut structures, &at, &weighing).whole)
 }
 
 #[cfg(test)]
@@ -74,7 +64,6 @@ mod tests {
     use crate::estimate::maximum_likelihood::maximum_likelihood;
     use crate::geometry::Gaussian;
     use crate::observe::StereoTrack;
-    use nalgebra::Vector3;
 
     fn tracks(rig: &StereoRig, phi: &Twist, bias: Vector3<f64>, offset: f64) -> Vec<StereoTrack> {
         let variances = [0.01, 0.01, 0.02];

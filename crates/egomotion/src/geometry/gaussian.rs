@@ -20,12 +20,13 @@ impl<const N: usize> Gaussian<N> {
     /// The Gaussian of a function of the quantities, Σ_F = J Σ_S Jᵀ, equation (30).
     ///
     /// `mean` is the function's value and `jacobian` its derivative, both at this mean.
+    #[inline(always)]
     pub fn propagate<const M: usize>(
         &self,
         mean: SVector<f64, M>,
         jacobian: &SMatrix<f64, M, N>,
     ) -> Gaussian<M> {
-        Gaussian { mean, cov: jacobian * self.cov * jacobian.transpose() }
+        Gaussian { mean, cov: product(&product(jacobian, &self.cov), &jacobian.transpose()) }
     }
 
     /// Standard deviation of quantity `i`.
@@ -63,6 +64,35 @@ impl Gaussian<1> {
     /// The variance.
     pub fn variance(&self) -> f64 {
         self.cov[(0, 0)]
+    }
+}
+
+/// A B, in place of the library's product for matrices of any size, which costs twice as much for those as small as here.
+#[inline(always)]
+pub(crate) fn product<const N: usize, const K: usize, const M: usize>(
+    a: &SMatrix<f64, N, K>,
+    b: &SMatrix<f64, K, M>,
+) -> SMatrix<f64, N, M> {
+    let mut out = SMatrix::from_data(nalgebra::ArrayStorage([[0.0; N]; M]));
+    accumulate(&mut out, a, b);
+    out
+}
+
+/// sum += A B.
+#[inline(always)]
+pub(crate) fn accumulate<const N: usize, const K: usize, const M: usize>(
+    sum: &mut SMatrix<f64, N, M>,
+    a: &SMatrix<f64, N, K>,
+    b: &SMatrix<f64, K, M>,
+) {
+    // Stored by columns.
+    let (sum, a, b) = (&mut sum.data.0, &a.data.0, &b.data.0);
+    for m in 0..M {
+        for k in 0..K {
+            for n in 0..N {
+                sum[m][n] += a[k][n] * b[m][k];
+            }
+        }
     }
 }
 

@@ -31,16 +31,19 @@ impl<T: Copy> Grid<T> {
     }
 
     /// Width, in pixels.
+    #[inline(always)]
     pub fn width(&self) -> usize {
         self.width
     }
 
     /// Height, in pixels.
+    #[inline(always)]
     pub fn height(&self) -> usize {
         self.height
     }
 
     /// (width, height), in pixels.
+    #[inline(always)]
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
@@ -56,6 +59,7 @@ impl<T: Copy> Grid<T> {
     }
 
     /// Row `v`, for 0 ≤ v < height.
+    #[inline(always)]
     pub fn row(&self, v: usize) -> &[T] {
         &self.values[v * self.width..(v + 1) * self.width]
     }
@@ -66,6 +70,7 @@ impl<T: Copy> Grid<T> {
     }
 
     /// Value at pixel (u, v), which must lie inside.
+    #[inline(always)]
     pub fn at(&self, u: usize, v: usize) -> T {
         self.values[v * self.width + u]
     }
@@ -76,6 +81,7 @@ impl<T: Copy> Grid<T> {
     }
 
     /// The four pixels around (u, v) and the weights of the bilinear mean; `None` outside.
+    #[inline(always)]
     fn corners(&self, u: f64, v: f64) -> Option<([T; 4], [f64; 4])> {
         let inside = |c: f64, n: usize| c >= 0.0 && c <= n as f64 - 1.0;
         if !(inside(u, self.width) && inside(v, self.height)) {
@@ -91,6 +97,7 @@ impl<T: Copy> Grid<T> {
 
 impl Grid<f32> {
     /// Bilinear value at (u, v), in pixels; `None` outside.
+    #[inline(always)]
     pub fn sample(&self, u: f64, v: f64) -> Option<f64> {
         let (values, weights) = self.corners(u, v)?;
         Some(values.iter().zip(weights).map(|(&value, w)| w * f64::from(value)).sum())
@@ -121,21 +128,25 @@ impl Field {
     }
 
     /// Width, in pixels.
+    #[inline(always)]
     pub fn width(&self) -> usize {
         self.0.width()
     }
 
     /// Height, in pixels.
+    #[inline(always)]
     pub fn height(&self) -> usize {
         self.0.height()
     }
 
     /// (width, height), in pixels.
+    #[inline(always)]
     pub fn size(&self) -> (usize, usize) {
         self.0.size()
     }
 
     /// Value at pixel (u, v), which must lie inside.
+    #[inline(always)]
     pub fn get(&self, u: usize, v: usize) -> Option<f32> {
         Some(self.0.at(u, v)).filter(|value| !value.is_nan())
     }
@@ -146,6 +157,7 @@ impl Field {
     }
 
     /// Row `v`, missing pixels as NaN.
+    #[inline(always)]
     pub fn row(&self, v: usize) -> &[f32] {
         self.0.row(v)
     }
@@ -156,15 +168,43 @@ impl Field {
     }
 
     /// Bilinear value at (u, v); `None` outside, or where one of the pixels it needs is missing.
+    #[inline(always)]
     pub fn sample(&self, u: f64, v: f64) -> Option<f64> {
-        let (values, weights) = self.0.corners(u, v)?;
-        let mut sum = 0.0;
-        for (value, w) in values.into_iter().zip(weights) {
-            if w > 0.0 {
-                sum += w * f64::from(value);
-            }
+        let (width, height) = self.size();
+        let inside = |c: f64, n: usize| c >= 0.0 && c <= n as f64 - 1.0;
+        if !(inside(u, width) && inside(v, height)) {
+            return None;
         }
-        Some(sum).filter(|s| !s.is_nan())
+        let (u0, v0) = (u as usize, v as usize);
+        let across = |v: usize| {
+            let row = self.row(v.min(height - 1));
+            blend(row[u0].into(), row[(u0 + 1).min(width - 1)].into(), u - u0 as f64)
+        };
+        Some(blend(across(v0), across(v0 + 1), v - v0 as f64)).filter(|value| !value.is_nan())
+    }
+
+    /// Bilinear value at (u, v), and central differences of such values one pixel each way; `None` outside, or
+    /// where one of the pixels they need is missing.
+    #[inline(always)]
+    pub fn sample_with_gradient(&self, u: f64, v: f64) -> Option<(f64, (f64, f64))> {
+        let (width, height) = self.size();
+        let inside = |c: f64, n: usize| c >= 1.0 && c + 1.0 <= n as f64 - 1.0;
+        if !(inside(u, width) && inside(v, height)) {
+            return None;
+        }
+        let (u0, v0) = (u as usize, v as usize);
+        let (a, b) = (u - u0 as f64, v - v0 as f64);
+        let across = |row: usize, from: usize| {
+            let row = self.row((v0 + row - 1).min(height - 1));
+            let value = |i: usize| f64::from(row[(u0 + from + i - 1).min(width - 1)]);
+            blend(value(0), value(1), a)
+        };
+        let column = [across(0, 1), across(1, 1), across(2, 1), across(3, 1)];
+        let (left, right) = (blend(across(1, 0), across(2, 0), b), blend(across(1, 2), across(2, 2), b));
+        let (above, below) = (blend(column[0], column[1], b), blend(column[2], column[3], b));
+        let gradient = (0.5 * (right - left), 0.5 * (below - above));
+        let value = blend(column[1], column[2], b);
+        (!(value + gradient.0 + gradient.1).is_nan()).then_some((value, gradient))
     }
 
     /// Central differences (∂/∂u, ∂/∂v) over one pixel each way; `None` where a neighbour is missing.
@@ -194,9 +234,28 @@ impl Field {
     }
 }
 
+/// (1 − w) p + w q; q may be missing where its weight is zero.
+#[inline(always)]
+fn blend(p: f64, q: f64, w: f64) -> f64 {
+    if w > 0.0 { p + w * (q - p) } else { p }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_plane_has_its_gradient_where_all_pixels_are_known() {
+        let mut field = Field::from_grid(Grid::from_fn(6, 5, |u, v| 2.0 * u as f32 - 3.0 * v as f32));
+        assert_eq!(field.sample_with_gradient(2.25, 1.5), Some((0.0, (2.0, -3.0))));
+        assert_eq!(field.sample_with_gradient(4.0, 3.0), Some((-1.0, (2.0, -3.0))));
+        assert_eq!(field.sample_with_gradient(4.1, 3.0), None);
+        assert_eq!(field.sample_with_gradient(0.9, 3.0), None);
+        assert_eq!(field.sample_with_gradient(f64::NAN, 3.0), None);
+        field.set(4, 2, None);
+        assert_eq!(field.sample_with_gradient(2.25, 1.5), None);
+        assert_eq!(field.sample_with_gradient(2.0, 1.5), Some((-0.5, (2.0, -3.0))));
+    }
 
     #[test]
     fn bilinear_reproduces_a_plane_and_respects_holes() {

@@ -1,6 +1,6 @@
 //! The rectified stereo rig: the one place that knows the sign of disparity and Z = b f / d.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -140,11 +140,13 @@ impl StereoRig {
     }
 
     /// The point (X, Y, Z) in metres, left camera, measured as (x, y, d); `None` unless d > 0.
+    #[inline(always)]
     pub fn point(&self, xyd: &Vector3<f64>) -> Option<Vector3<f64>> {
         (xyd.z > 0.0).then(|| Vector3::new(xyd.x, xyd.y, self.focal_px) * (self.baseline_m / xyd.z))
     }
 
     /// Image coordinates and disparity (x, y, d) of a point of the left camera's frame; `None` unless Z > 0.
+    #[inline(always)]
     pub fn project(&self, p: &Vector3<f64>) -> Option<Vector3<f64>> {
         (p.z > 0.0).then(|| Vector3::new(p.x, p.y, self.baseline_m) * (self.focal_px / p.z))
     }
@@ -166,21 +168,34 @@ impl StereoRig {
         )
     }
 
+    /// Change of (x, y, d) when a point P of the left camera's frame moves by a little: ∂(x, y, d)/∂P · `change`.
+    #[inline(always)]
+    pub fn projected_change(&self, p: &Vector3<f64>, change: &Vector3<f64>) -> Vector3<f64> {
+        let k = self.focal_px / p.z;
+        let kz = -k / p.z * change.z;
+        Vector3::new(k * change.x + kz * p.x, k * change.y + kz * p.y, kz * self.baseline_m)
+    }
+
     /// ∂(x, y, d)/∂(X, Y, Z) at a point of the left camera's frame, 3×3.
     pub fn project_jacobian(&self, p: &Vector3<f64>) -> Matrix3<f64> {
-        let k = self.focal_px / p.z;
-        let kz = -k / p.z;
-        Matrix3::new(
-            k,
-            0.0,
-            kz * p.x, //
-            0.0,
-            k,
-            kz * p.y, //
-            0.0,
-            0.0,
-            kz * self.baseline_m,
-        )
+        let column = |i| self.projected_change(p, &Vector3::ith(i, 1.0));
+        Matrix3::from_columns(&[column(0), column(1), column(2)])
+    }
+
+    /// ∂(v_x, v_y, Δv)/∂(t, Ω), 3×6: how (x, y, d) of a point changes with the velocities, (3) and (9).
+    #[inline(always)]
+    pub fn velocity_jacobian(&self, xyd: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
+        let (f, [x, y, d]) = (self.focal_px, (*xyd).into());
+        let per_m = d / self.depth_disparity_product();
+        let (k, xf, yf) = (f * per_m, x / f, y / f);
+        SMatrix::from_data(ArrayStorage([
+            [k, 0.0, 0.0],
+            [0.0, k, 0.0],
+            [-x * per_m, -y * per_m, -d * per_m],
+            [-x * yf, -f - y * yf, -d * yf],
+            [f + x * xf, x * yf, d * xf],
+            [-y, x, 0.0],
+        ]))
     }
 
     /// Centre of the left camera in the cyclopean frame, (−b/2, 0, 0), in metres; the right one is its negative.
@@ -204,6 +219,16 @@ mod tests {
         assert!((back - xyd).norm() < 1e-12);
         let product = rig().project_jacobian(&rig().point(&xyd).unwrap()) * rig().point_jacobian(&xyd);
         assert!((product - Matrix3::identity()).norm() < 1e-12);
+    }
+
+    #[test]
+    fn velocities_move_the_projection() {
+        let p = Vector3::new(0.4, -0.3, 3.0);
+        let (t, w) = (Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.02, 0.05, -0.03));
+        let moved = rig().project_jacobian(&p) * (t + w.cross(&p));
+        let phi = nalgebra::Vector6::new(t.x, t.y, t.z, w.x, w.y, w.z);
+        let rates = rig().velocity_jacobian(&rig().project(&p).unwrap()) * phi;
+        assert!((rates - moved).norm() < 1e-12);
     }
 
     #[test]

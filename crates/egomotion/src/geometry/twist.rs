@@ -117,8 +117,14 @@ impl RigidMotion {
     }
 
     /// R P + T, equation (5).
+    #[inline(always)]
     pub fn apply(&self, p: &Vector3<f64>) -> Vector3<f64> {
-        self.rotation * p + self.translation
+        let (r, t) = (&self.rotation, &self.translation);
+        Vector3::new(
+            r.m11 * p.x + r.m12 * p.y + r.m13 * p.z + t.x,
+            r.m21 * p.x + r.m22 * p.y + r.m23 * p.z + t.y,
+            r.m31 * p.x + r.m32 * p.y + r.m33 * p.z + t.z,
+        )
     }
 
     /// `self` after `first`: c_from_a = c_from_b.after(&b_from_a).

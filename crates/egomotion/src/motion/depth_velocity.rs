@@ -1,8 +1,9 @@
 //! VZ of one pixel by the paper's four methods, by the un-linearised (6), and as part of a rigid scene.
 
-use nalgebra::{Matrix2, SMatrix, Vector2, Vector3, Vector4, Vector6};
+use nalgebra::{Matrix2, SMatrix, Vector2, Vector4};
 
-use crate::geometry::{Field, Gaussian, RigidMotion, StereoRig, Twist};
+pub use super::rigid_prediction::{DisparityOffset, RigidPrediction};
+use crate::geometry::{Field, Gaussian, StereoRig};
 use crate::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 
 /// Depth and depth velocity of one pixel, with their joint covariance.
@@ -22,15 +23,19 @@ impl DepthVelocity {
 
     /// Looming −VZ/(Z′ Δt) at the later frame, in 1/s, with Z′ = Z + VZ; `None` unless Z′ > 0.
     pub fn looming(&self, dt_s: f64) -> Option<Gaussian<1>> {
+        let later = self.z_vz.mean.x + self.z_vz.mean.y;
+        (later > 0.0).then(|| self.looming_in_front(dt_s))
+    }
+
+    /// [`DepthVelocity::looming`] where Z′ is known to be positive.
+    #[inline(always)]
+    pub(crate) fn looming_in_front(&self, dt_s: f64) -> Gaussian<1> {
         let [z, vz] = self.z_vz.mean.into();
-        let later = z + vz;
-        if later.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
-            return None;
-        }
-        // −VZ/Z′ = Z/Z′ − 1.
-        let gradient = SMatrix::<f64, 1, 2>::new(vz, -z) / (later * later);
-        let per_interval = self.z_vz.propagate(SMatrix::<f64, 1, 1>::new(-vz / later), &gradient);
-        Some(Gaussian::scalar(per_interval.value() / dt_s, per_interval.variance() / (dt_s * dt_s)))
+        let (cov, per_later) = (&self.z_vz.cov, (z + vz).recip());
+        // −VZ/Z′ = Z/Z′ − 1, whose gradient by (Z, VZ) is (VZ, −Z)/Z′².
+        let (by_z, by_vz) = (vz * per_later * per_later, -z * per_later * per_later);
+        let variance = by_z * by_z * cov.m11 + 2.0 * by_z * by_vz * cov.m12 + by_vz * by_vz * cov.m22;
+        Gaussian::scalar(-vz * per_later / dt_s, variance / (dt_s * dt_s))
     }
 
     /// The same with Z at the beginning of the interval, of one that holds Z at its middle.
@@ -43,6 +48,7 @@ impl DepthVelocity {
     }
 
     /// From disparity before and after (d, d′) and their joint covariance; `bf` is b f. Needs d, d′ > 0.
+    #[inline(always)]
     pub fn from_disparities(disparities: &Gaussian<2>, bf: f64) -> Self {
         let [d, after] = disparities.mean.into();
         let jacobian = Matrix2::new(-bf / (d * d), 0.0, bf / (d * d), -bf / (after * after));
@@ -159,84 +165,6 @@ pub fn exact_change(z_m: f64, after: &Field, u: f64, v: f64, rig: &StereoRig) ->
     Some(rig.depth(after.sample(u, v)?)? - z_m)
 }
 
-/// The rigid motion φ with what every pixel's prediction shares.
-#[derive(Debug, Clone, Copy)]
-pub struct RigidPrediction<'a> {
-    rig: &'a StereoRig,
-    motion: RigidMotion,
-    left_jacobian: nalgebra::Matrix6<f64>,
-    cov: nalgebra::Matrix6<f64>,
-    offset: DisparityOffset,
-}
-
-/// An unknown offset common to all disparities: what an imperfect calibration does to the rig.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DisparityOffset {
-    /// Its standard deviation, in pixels.
-    pub sigma_px: f64,
-    /// How φ changes per pixel of it.
-    pub phi_per_px: Vector6<f64>,
-}
-
-impl DisparityOffset {
-    /// A perfect calibration.
-    pub fn none() -> Self {
-        Self { sigma_px: 0.0, phi_per_px: Vector6::zeros() }
-    }
-}
-
-impl<'a> RigidPrediction<'a> {
-    /// Predict with φ ± its covariance; `None` where some component of φ is unknown.
-    ///
-    /// The offset makes the part of the variance that is calibration's.
-    pub fn new(phi: &Gaussian<6>, offset: DisparityOffset, rig: &'a StereoRig) -> Option<Self> {
-        let twist = Twist::from_vector(&phi.mean);
-        phi.cov.iter().all(|v| v.is_finite()).then(|| Self {
-            rig,
-            motion: twist.exp(),
-            left_jacobian: twist.left_jacobian(),
-            cov: phi.cov,
-            offset,
-        })
-    }
-
-    /// The rigid motion exp(φ).
-    pub fn motion(&self) -> &RigidMotion {
-        &self.motion
-    }
-
-    /// Where a point measured as (x, y, d) goes: (x′, y′, d′); `None` behind the camera.
-    pub fn moved(&self, xyd: &Vector3<f64>) -> Option<Vector3<f64>> {
-        self.rig.project(&self.motion.apply(&self.rig.point(xyd)?))
-    }
-
-    /// Z and VZ of the still world's point (x, y, d), from the noise `sigma_d` of d and that of φ.
-    pub fn depth_velocity(&self, xyd: &Vector3<f64>, sigma_d: f64) -> Option<DepthVelocity> {
-        let p = self.rig.point(xyd)?;
-        let moved = self.motion.apply(&p);
-        if moved.z <= 0.0 {
-            return None;
-        }
-        let by_d = self.rig.point_jacobian(xyd).column(2).into_owned();
-        let vz_by_d = self.motion.rotation.row(2).dot(&by_d.transpose()) - by_d.z;
-        let by_phi: Vector6<f64> =
-            (RigidMotion::point_jacobian(&moved).row(2) * self.left_jacobian).transpose();
-        let var = sigma_d * sigma_d;
-        let cross = by_d.z * vz_by_d * var;
-        let cov = Matrix2::new(
-            by_d.z * by_d.z * var,
-            cross,
-            cross,
-            vz_by_d * vz_by_d * var + by_phi.dot(&(self.cov * by_phi)),
-        );
-        // The offset moves φ and this pixel's own disparity together.
-        let by_offset =
-            Vector2::new(by_d.z, by_phi.dot(&self.offset.phi_per_px) + vz_by_d) * self.offset.sigma_px;
-        let cov = cov + by_offset * by_offset.transpose();
-        Some(DepthVelocity { z_vz: Gaussian { mean: Vector2::new(p.z, moved.z - p.z), cov } })
-    }
-}
-
 /// The rigid prediction where the measurement does not contradict it, else the measurement.
 ///
 /// They contradict when they differ by more than three standard deviations of the difference: then
@@ -246,13 +174,17 @@ pub fn rigid_unless_moving(
     rigid: Option<DepthVelocity>,
 ) -> Option<DepthVelocity> {
     match (measured, rigid) {
-        (Some(m), Some(r)) => {
-            let variance = m.vz().variance() + r.vz().variance();
-            let apart = (m.vz().value() - r.vz().value()).powi(2) > 9.0 * variance;
-            Some(if apart { m } else { r })
-        }
+        (Some(m), Some(r)) => Some(if contradict(&m, &r) { m } else { r }),
         (measured, rigid) => rigid.or(measured),
     }
+}
+
+/// Whether a measured VZ and the rigid one differ by more than three standard deviations of their difference.
+#[inline(always)]
+pub(crate) fn contradict(measured: &DepthVelocity, rigid: &DepthVelocity) -> bool {
+    let (m, r) = (&measured.z_vz, &rigid.z_vz);
+    let apart = m.mean.y - r.mean.y;
+    apart * apart > 9.0 * (m.cov.m22 + r.cov.m22)
 }
 
 /// Smallest change of depth that a disparity step δ shows at disparity d, ΔZ = −Z/(1 + d/δ) in metres, (51).

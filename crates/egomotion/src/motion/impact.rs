@@ -17,6 +17,7 @@ pub struct TimeToImpact {
 
 impl TimeToImpact {
     /// 1/looming in seconds; `None` where the point does not approach.
+    #[inline(always)]
     pub fn seconds(&self) -> Option<f64> {
         let looming = self.looming.value();
         (looming > 0.0).then(|| looming.recip())
@@ -24,10 +25,17 @@ impl TimeToImpact {
 
     /// The 95 % interval in seconds; its far end is infinite where looming may be zero. `None` where the
     /// whole interval recedes.
+    #[inline(always)]
     pub fn interval95_s(&self) -> Option<(f64, f64)> {
-        let (mean, half) = (self.looming.value(), Z95 * self.looming.sigma(0));
-        let (slow, fast) = (mean - half, mean + half);
+        let (fast, slow) = self.rates95();
         (fast > 0.0).then(|| (fast.recip(), if slow > 0.0 { slow.recip() } else { f64::INFINITY }))
+    }
+
+    /// The ends of looming's 95 % interval, the faster one first, in 1/s.
+    #[inline(always)]
+    pub(crate) fn rates95(&self) -> (f64, f64) {
+        let (mean, half) = (self.looming.value(), Z95 * self.looming.sigma(0));
+        (mean + half, mean - half)
     }
 }
 
@@ -53,9 +61,11 @@ impl Default for VehicleWindow {
 
 impl VehicleWindow {
     /// Whether a point at P′ moving by V per second passes through the window when it reaches the camera's plane.
+    #[inline(always)]
     pub fn is_crossed_by(&self, later: &Vector3<f64>, velocity: &Vector3<f64>, seconds: f64) -> bool {
         let (x, y) = (later.x + velocity.x * seconds, later.y + velocity.y * seconds);
-        (self.left_m..=self.right_m).contains(&x) && (self.top_m..=self.bottom_m).contains(&y)
+        // Without branches, so that many points can be asked at once.
+        (x >= self.left_m) & (x <= self.right_m) & (y >= self.top_m) & (y <= self.bottom_m)
     }
 }
 

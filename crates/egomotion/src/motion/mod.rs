@@ -2,6 +2,7 @@
 
 pub mod depth_velocity;
 pub mod impact;
+mod rigid_prediction;
 
 pub use depth_velocity::DepthVelocity;
 pub use impact::TimeToImpact;

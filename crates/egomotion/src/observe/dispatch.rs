@@ -5,11 +5,11 @@
 /// Only what is inlined is compiled for it: what the body calls should be `#[inline(always)]`.
 /// Fused multiplications are not used: both give the same answer bit for bit.
 macro_rules! vectorised {
-    ($(#[$meta:meta])* $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $output:ty)? $body:block) => {
+    ($(#[$meta:meta])* $visible:vis $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $output:ty)? $body:block) => {
         $(#[$meta])*
         // Calling what is compiled for AVX2 is safe only on a machine that has it, which is asked first.
         #[allow(unsafe_code)]
-        fn $name($($argument: $type),*) $(-> $output)? {
+        $visible fn $name($($argument: $type),*) $(-> $output)? {
             #[inline(always)]
             fn plain($($argument: $type),*) $(-> $output)? $body
             #[cfg(target_arch = "x86_64")]

@@ -2,7 +2,7 @@
 
 pub mod corners;
 pub mod disparity;
-mod dispatch;
+pub(crate) mod dispatch;
 pub mod flow;
 mod follow;
 pub mod observation;
@@ -13,6 +13,7 @@ mod row_search;
 pub mod sample;
 pub mod spline;
 pub mod stereo_pyramid;
+pub mod temporal_disparity;
 pub mod tracks;
 mod window;
 

@@ -32,29 +32,45 @@ impl DensePair<'_> {
     ) -> Vec<T> {
         let (width, height) = self.flow.size();
         let step = step.max(1);
-        (step / 2..height)
+        let rows: Vec<usize> = (step / 2..height).step_by(step).collect();
+        let found: Vec<Vec<T>> = rows
             .into_par_iter()
-            .step_by(step)
-            .flat_map_iter(|v| {
-                (step / 2..width).step_by(step).filter_map(|u| observe(self, u, v)).collect::<Vec<_>>()
+            .map(|v| {
+                let mut row = Vec::with_capacity(width.div_ceil(step));
+                row.extend((step / 2..width).step_by(step).filter_map(|u| observe(self, u, v)));
+                row
             })
-            .collect()
+            .collect();
+        let mut all = Vec::with_capacity(found.iter().map(Vec::len).sum());
+        found.into_iter().for_each(|row| all.extend(row));
+        all
+    }
+
+    /// d at t with its variance where it is measured.
+    #[inline(always)]
+    pub(crate) fn disparity(&self, u: usize, v: usize) -> Option<(f64, f64)> {
+        let d = self.rig.disparity_from_shift(f64::from(self.before.shift.get(u, v)?));
+        let sigma = f64::from(self.before.sigma.get(u, v).filter(|&sigma| sigma < GUESS_SIGMA_PX)?);
+        (d > 0.0).then_some((d, sigma * sigma))
     }
 
     /// (x, y, d) at t with its covariance: the pixel is exact, disparity is measured.
     fn before(&self, u: usize, v: usize) -> Option<Gaussian<3>> {
-        let d = self.rig.disparity_from_shift(f64::from(self.before.shift.get(u, v)?));
-        let sigma = self.before.sigma.get(u, v).filter(|&sigma| sigma < GUESS_SIGMA_PX)?;
-        let sigma = f64::from(sigma);
+        let (d, variance) = self.disparity(u, v)?;
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
-        (d > 0.0).then(|| Gaussian::independent([x, y, d], [0.0, 0.0, sigma * sigma]))
+        Some(Gaussian::independent([x, y, d], [0.0, 0.0, variance]))
     }
 
     /// The flow at a pixel in image coordinates.
-    fn displacement(&self, u: usize, v: usize) -> Option<Gaussian<2>> {
-        let flow = self.flow.get(u, v)?;
-        let scale = Matrix2::from_diagonal(&Vector2::new(1.0, self.rig.aspect()));
-        Some(flow.propagate(scale * flow.mean, &scale))
+    #[inline(always)]
+    pub(crate) fn displacement(&self, u: usize, v: usize) -> Option<Gaussian<2>> {
+        let Gaussian { mean, cov } = self.flow.get(u, v)?;
+        let aspect = self.rig.aspect();
+        let cross = aspect * cov.m12;
+        Some(Gaussian {
+            mean: Vector2::new(mean.x, aspect * mean.y),
+            cov: Matrix2::new(cov.m11, cross, cross, aspect * aspect * cov.m22),
+        })
     }
 
     /// The tracked point of a pixel: (x, y, d) before, and where flow and the later map put it after.
@@ -65,19 +81,35 @@ impl DensePair<'_> {
         let mut before = self.before(u, v)?;
         let moved = self.displacement(u, v)?;
         let (x, y) = (before.mean.x + moved.mean.x, before.mean.y + moved.mean.y);
-        let (later, gradient) = disparity_at(self.rig, self.after, x, y)?;
         let half = 0.5 * moved.cov;
-        // Along its row a window is located by 1/G_xx, which is less than (G⁻¹)_xx; see `tracks`.
-        let along_row = half.determinant() / half[(1, 1)];
-        let shared = |d_variance: f64| 0.5 * d_variance.min(along_row).max(0.0);
-        before.cov = joint(&half, Vector2::new(shared(before.cov[(2, 2)]), 0.0), before.cov[(2, 2)]);
-        // d′ is read where flow says, so an error of flow moves it along the map's slope.
-        let own = Vector2::new(shared(later.variance()), 0.0);
-        let slope = half * gradient;
-        let variance = later.variance() + gradient.dot(&slope) + 2.0 * own.dot(&gradient);
+        let own = Vector2::new(shared_variance(&half, before.cov[(2, 2)]), 0.0);
+        before.cov = joint(&half, own, before.cov[(2, 2)]);
+        let (later, cross) = self.later(x, y, &half)?;
         let after =
-            Gaussian { mean: Vector3::new(x, y, later.value()), cov: joint(&half, own + slope, variance) };
+            Gaussian { mean: Vector3::new(x, y, later.value()), cov: joint(&half, cross, later.variance()) };
         Some(StereoTrack { before, after })
+    }
+
+    /// d and d′ of a pixel, as [`DensePair::stereo_track`] has them.
+    #[inline(always)]
+    pub fn disparities(&self, u: usize, v: usize) -> Option<Gaussian<2>> {
+        let (d, variance) = self.disparity(u, v)?;
+        let moved = self.displacement(u, v)?;
+        let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
+        let (later, _) = self.later(x + moved.mean.x, y + moved.mean.y, &(0.5 * moved.cov))?;
+        Some(Gaussian::independent([d, later.value()], [variance, later.variance()]))
+    }
+
+    /// d′ at (x, y), a place known with the covariance `place`, and its covariance with that place.
+    ///
+    /// d′ is read where flow says, so an error of flow moves it along the map's slope.
+    #[inline(always)]
+    fn later(&self, x: f64, y: f64, place: &Matrix2<f64>) -> Option<(Gaussian<1>, Vector2<f64>)> {
+        let (later, gradient) = disparity_at(self.rig, self.after, x, y)?;
+        let own = Vector2::new(shared_variance(place, later.variance()), 0.0);
+        let slope = place * gradient;
+        let variance = later.variance() + gradient.dot(&slope) + 2.0 * own.dot(&gradient);
+        Some((Gaussian::scalar(later.value(), variance), own + slope))
     }
 
     /// Discrete DCCE: disparity at the pixel at t and t′, its gradient at t′, and the displacement.
@@ -156,6 +188,14 @@ impl DensePair<'_> {
     }
 }
 
+/// The covariance of x and d in one image: half of the lesser of d's variance and the window's along its row.
+///
+/// Along its row a window is located by 1/G_xx, which is less than (G⁻¹)_xx; see [`super::tracks`].
+#[inline(always)]
+fn shared_variance(place: &Matrix2<f64>, d_variance: f64) -> f64 {
+    0.5 * d_variance.min(place.determinant() / place[(1, 1)]).max(0.0)
+}
+
 /// The covariance of (x, y, d) from that of (x, y), its covariance with d, and the variance of d.
 fn joint(place: &Matrix2<f64>, cross: Vector2<f64>, variance: f64) -> Matrix3<f64> {
     Matrix3::new(
@@ -173,15 +213,13 @@ fn joint(place: &Matrix2<f64>, cross: Vector2<f64>, variance: f64) -> Matrix3<f6
 
 /// Disparity measured at image coordinates (x, y) with its variance, and its gradient there by central
 /// differences.
+#[inline(always)]
 fn disparity_at(rig: &StereoRig, map: &DisparityMap, x: f64, y: f64) -> Option<(Gaussian<1>, Vector2<f64>)> {
     let (u, v) = rig.pixel_from_image(x, y);
-    let shift = |du: f64, dv: f64| map.shift.sample(u + du, v + dv);
-    let d = rig.disparity_from_shift(shift(0.0, 0.0)?);
+    let (shift, (du, dv)) = map.shift.sample_with_gradient(u, v)?;
+    let d = rig.disparity_from_shift(shift);
     let sigma = map.sigma.sample(u, v)?;
-    let gradient = Vector2::new(
-        0.5 * (shift(1.0, 0.0)? - shift(-1.0, 0.0)?),
-        0.5 * (shift(0.0, 1.0)? - shift(0.0, -1.0)?) / rig.aspect(),
-    );
+    let gradient = Vector2::new(du, dv / rig.aspect());
     // Beyond one pixel of disparity per pixel the stencil straddles a depth edge.
     let on_surface = gradient.amax() < 1.0;
     let measured = sigma < f64::from(GUESS_SIGMA_PX);

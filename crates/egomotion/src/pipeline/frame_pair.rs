@@ -209,7 +209,8 @@ impl FramePair<'_> {
         let rows = row_disagreement(&self.before.images, tracks, self.rig);
         let (maps, mut seen) = timed(&mut stages.maps_ms, || {
             let rigid = self.rigid(tracks, motion.as_ref().ok(), rows);
-            motion_maps(&pair, rigid.as_ref(), self.config, self.dt_s())
+            let images = (&self.before.images, &self.after.images);
+            motion_maps(&pair, images, rigid.as_ref(), self.config, self.dt_s())
         });
         PairResult {
             motion: motion.map_err(Unanswered::from),

@@ -2,7 +2,9 @@
 
 pub mod config;
 mod frame_pair;
+mod map_row;
 pub mod maps;
+mod moving;
 pub mod solve;
 pub mod stereo;
 pub mod trajectory;

@@ -8,7 +8,6 @@ use crate::estimate::lmeds::{LmedsOptions, lmeds};
 use crate::estimate::m_estimator::m_estimate;
 use crate::estimate::maximum_likelihood::maximum_likelihood;
 use crate::estimate::measurement::Measurement;
-use crate::estimate::systematic::common_errors;
 use crate::estimate::two_step::two_step;
 use crate::estimate::{Blocks, Fit, MotionEstimate, Row, Unsolvable};
 use crate::geometry::{StereoRig, Twist};
@@ -65,8 +64,8 @@ impl<'a> Solver<'a> {
         match observed {
             Observed::Sparse(tracks) => tracks.to_vec(),
             Observed::Dense(pair, tracks) => {
-                let mut all = tracks.to_vec();
-                all.extend(pair.every(self.config.sample_step_px, DensePair::stereo_track));
+                let mut all = pair.every(self.config.sample_step_px, DensePair::stereo_track);
+                all.extend_from_slice(tracks);
                 all
             }
         }
@@ -120,10 +119,10 @@ impl<'a> Solver<'a> {
     pub fn likelihood<M: Measurement>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
         let options = &self.config.maximum_likelihood;
         let blocks = Some(&self.blocks);
-        let mut motion =
-            maximum_likelihood(observations, self.rig, self.start, blocks, &options.kernel)?.motion;
+        let found = maximum_likelihood(observations, self.rig, self.start, blocks, &options.kernel)?;
+        let mut motion = found.motion;
         if motion.theta.cov.iter().all(|v| v.is_finite())
-            && let Some(common) = common_errors(observations, self.rig, &motion.phi(), &options.kernel)
+            && let Some(common) = found.common
         {
             motion.theta.cov += common.localisation_covariance(options.localisation_bias_px);
         }

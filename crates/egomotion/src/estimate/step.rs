@@ -1,0 +1,180 @@
+//! The sums over all observations from which maximum likelihood makes one Gauss–Newton step.
+
+use nalgebra::{ArrayStorage, Matrix6, SMatrix, Vector3, Vector6};
+use rayon::prelude::*;
+
+use super::blocks::{BlockScore, Blocks};
+use super::m_estimator::StudentT;
+use super::measurement::{At, Linearised, Measurement};
+use crate::geometry::gaussian::{accumulate, product};
+use crate::observe::dispatch::vectorised;
+use crate::observe::{StereoFlow, StereoTrack};
+
+/// Sums over observations, by φ.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Step {
+    /// Σ w Gᵀ S⁻¹ G and Σ w Gᵀ S⁻¹ e.
+    pub(super) score: BlockScore<6>,
+    /// By how much the score's true derivative is less than the information, because weights change as well.
+    reweighting: Matrix6<f64>,
+    /// Σ w Gᵀ S⁻¹ δe for errors that all observations share: a localisation bias in x, y and d, an offset of disparity.
+    pub(super) shared: SMatrix<f64, 6, 4>,
+    /// Σ w.
+    weights: f64,
+    /// Σ w q.
+    pub(super) weighted_square: f64,
+    /// Σ q.
+    pub(super) square: f64,
+    /// Number of observations in front of the camera.
+    pub(super) used: usize,
+    /// Number of observations that fit.
+    pub(super) inliers: usize,
+}
+
+/// How observations are weighed and grouped.
+#[derive(Debug, Clone, Copy)]
+pub struct Weighing<'a> {
+    /// Blocks whose sums are wanted; without them all is one block.
+    pub(super) blocks: Option<&'a Blocks>,
+    pub(super) kernel: &'a StudentT,
+    /// Squared scale of the misclosures in units of their stated covariance.
+    pub(super) scale2: f64,
+}
+
+/// Squared misclosure, in units of its scaled covariance, beyond which an observation is no inlier: χ²₃(0.99).
+const INLIER_Q: f64 = 11.345;
+
+/// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
+const STRIP: usize = 512;
+
+impl Step {
+    /// Derivative of the score by φ, with the robust weights' own.
+    pub(super) fn bread(&self) -> Matrix6<f64> {
+        self.score.information - self.reweighting
+    }
+
+    /// The next squared scale of the misclosures in units of their stated covariance.
+    ///
+    /// Σ w is the number of observations once the scale has settled; to divide by it in place of that
+    /// number makes few iterations of many (PX-EM: Liu, Rubin and Wu 1998).
+    pub(super) fn scale2(&self) -> f64 {
+        self.weighted_square / (3.0 * self.weights)
+    }
+
+    #[inline(always)]
+    fn add(&mut self, l: &Linearised, displacement_px: f64, weighing: &Weighing<'_>) {
+        let (kernel, scale2) = (weighing.kernel, weighing.scale2);
+        let q = l.misclosure.dot(&product(&l.inverse_cov, &l.misclosure));
+        let weight = kernel.weight(q / scale2, 3.0);
+        let weighted = product(&l.by_motion.transpose(), &(l.inverse_cov * weight));
+        let score: Vector6<f64> = product(&weighted, &l.misclosure);
+        accumulate(&mut self.score.information, &weighted, &l.by_motion);
+        accumulate(&mut self.score.score, &weighted, &l.misclosure);
+        let change = kernel.curvature(q / scale2, 3.0) / (scale2 * weight * weight);
+        accumulate(&mut self.reweighting, &(score * change), &score.transpose());
+        // Without motion both images are sampled alike, and share their errors.
+        let share = displacement_px.min(1.0);
+        let errors = SMatrix::<f64, 3, 4>::from_data(ArrayStorage([
+            [share, 0.0, 0.0],
+            [0.0, share, 0.0],
+            [0.0, 0.0, share],
+            l.by_offset.into(),
+        ]));
+        accumulate(&mut self.shared, &weighted, &errors);
+        self.weights += weight;
+        self.weighted_square += weight * q;
+        self.square += q;
+        self.used += 1;
+        self.inliers += usize::from(q <= INLIER_Q * scale2);
+    }
+
+    fn merged(mut self, other: &Self) -> Self {
+        self.score.information += other.score.information;
+        self.score.score += other.score.score;
+        self.reweighting += other.reweighting;
+        self.shared += other.shared;
+        self.weights += other.weights;
+        self.weighted_square += other.weighted_square;
+        self.square += other.square;
+        self.used += other.used;
+        self.inliers += other.inliers;
+        self
+    }
+
+    /// Sums by the small motion δ of a measurement as sums by φ.
+    fn by_phi(mut self, jacobian: &Matrix6<f64>) -> Self {
+        let across = jacobian.transpose();
+        self.score.information = across * self.score.information * jacobian;
+        self.score.score = across * self.score.score;
+        self.reweighting = across * self.reweighting * jacobian;
+        self.shared = across * self.shared;
+        self
+    }
+}
+
+/// The sums of one step: of each block, and of all observations.
+#[derive(Debug, Clone)]
+pub(super) struct Sums {
+    pub(super) by_block: Vec<Step>,
+    pub(super) whole: Step,
+}
+
+impl Sums {
+    /// Linearise about a motion and sum; structures are improved.
+    pub(super) fn over<M: Measurement>(
+        observations: &[M],
+        structures: &mut [Vector3<f64>],
+        at: &At<'_>,
+        weighing: &Weighing<'_>,
+    ) -> Self {
+        let strips: Vec<Vec<(usize, Step)>> = observations
+            .par_chunks(STRIP)
+            .zip(structures.par_chunks_mut(STRIP))
+            .map(|(observations, structures)| M::sums(observations, structures, at, weighing))
+            .collect();
+        let mut by_block = vec![Step::default(); weighing.blocks.map_or(1, Blocks::count)];
+        for (block, step) in strips.iter().flatten() {
+            by_block[*block] = by_block[*block].merged(step);
+        }
+        let jacobian = M::by_phi(at);
+        by_block.iter_mut().for_each(|step| *step = step.by_phi(&jacobian));
+        let whole = by_block.iter().fold(Step::default(), Step::merged);
+        Self { by_block, whole }
+    }
+}
+
+vectorised! {
+    pub(super) of_tracks(observations: &[StereoTrack], structures: &mut [Vector3<f64>], at: &At<'_>, weighing: &Weighing<'_>)
+        -> Vec<(usize, Step)> { strip(observations, structures, at, weighing) }
+}
+vectorised! {
+    pub(super) of_flows(observations: &[StereoFlow], structures: &mut [Vector3<f64>], at: &At<'_>, weighing: &Weighing<'_>)
+        -> Vec<(usize, Step)> { strip(observations, structures, at, weighing) }
+}
+
+/// [`Measurement::sums`] of observations of any kind.
+#[inline(always)]
+fn strip<M: Measurement>(
+    observations: &[M],
+    structures: &mut [Vector3<f64>],
+    at: &At<'_>,
+    weighing: &Weighing<'_>,
+) -> Vec<(usize, Step)> {
+    let mut runs = Vec::new();
+    let mut run = (0, Step::default());
+    for (observation, structure) in observations.iter().zip(structures) {
+        let (x, y) = observation.position();
+        let block = weighing.blocks.map_or(0, |blocks| blocks.index(x, y));
+        if block != run.0 {
+            if run.1.used > 0 {
+                runs.push(run);
+            }
+            run = (block, Step::default());
+        }
+        if let Some(l) = observation.linearise(structure, at) {
+            run.1.add(&l, observation.displacement_px(), weighing);
+        }
+    }
+    runs.push(run);
+    runs
+}

@@ -1,0 +1,258 @@
+//! One row of pixels from disparities to VZ and time to impact, by kernels that run on many pixels at once.
+//!
+//! The formulas are those of [`crate::motion`]; here they meet planes of numbers, in which what is
+//! missing is NaN and goes through as NaN.
+
+use nalgebra::{Matrix2, Vector2, Vector3};
+
+use super::config::{Approach, Config, Method};
+use super::moving::Moving;
+use crate::geometry::{Gaussian, StereoRig};
+use crate::motion::DepthVelocity;
+use crate::motion::depth_velocity::{self, RigidPrediction, contradict};
+use crate::motion::impact::{TimeToImpact, VehicleWindow};
+use crate::observe::DensePair;
+use crate::observe::dispatch::vectorised;
+
+/// What the rows of a pair of frames share.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scene<'a> {
+    pub(super) pair: &'a DensePair<'a>,
+    pub(super) rigid: Option<&'a RigidPrediction<'a>>,
+    pub(super) moving: Option<&'a Moving>,
+    pub(super) config: &'a Config,
+    pub(super) dt_s: f64,
+}
+
+/// The rays of a row's pixels.
+#[derive(Debug, Clone, Copy)]
+struct Rays<'a> {
+    rig: &'a StereoRig,
+    /// Image coordinates of the row's first pixel.
+    start: (f64, f64),
+}
+
+impl Rays<'_> {
+    /// (x, y, f) of pixel `u`.
+    #[inline(always)]
+    fn at(&self, u: usize) -> Vector3<f64> {
+        Vector3::new(self.start.0 + u as f64, self.start.1, self.rig.focal_px)
+    }
+}
+
+/// What is known of the pixels of a row, one plane a quantity.
+#[derive(Debug, Clone)]
+pub(super) struct MapRow {
+    /// d, its σ², d′, its σ², their covariance.
+    disparities: [Vec<f64>; 5],
+    /// σ of d where it may be a guess: what the rigid prediction goes by.
+    sigma: Vec<f64>,
+    /// Z, VZ, their variances and their covariance.
+    velocity: [Vec<f64>; 5],
+    /// Looming, its variance.
+    looming: [Vec<f64>; 2],
+    /// Whether the pixel will pass through the vehicle's window.
+    crosses: Vec<bool>,
+}
+
+/// The values of a row that leave it: VZ, its σ, time to impact, and the ends of its interval.
+pub(super) type Output<'a> = [&'a mut [f32]; 5];
+
+impl MapRow {
+    /// A row of so many pixels.
+    pub(super) fn new(width: usize) -> Self {
+        let plane = || vec![f64::NAN; width];
+        Self {
+            disparities: std::array::from_fn(|_| plane()),
+            sigma: plane(),
+            velocity: std::array::from_fn(|_| plane()),
+            looming: std::array::from_fn(|_| plane()),
+            crosses: vec![false; width],
+        }
+    }
+
+    /// Row `v` of a pair of frames.
+    pub(super) fn fill(&mut self, scene: &Scene<'_>, v: usize, out: Output<'_>) {
+        let &Scene { pair, rigid, config, dt_s, .. } = scene;
+        let rays = Rays { rig: pair.rig, start: pair.rig.image_from_pixel(0.0, v as f64) };
+        match (config.method, rigid) {
+            (Method::Dcce | Method::Dv, _) | (_, None) => {
+                for u in 0..self.width() {
+                    self.set_velocity(u, measured(pair, config, u, v));
+                }
+            }
+            (_, Some(rigid)) => {
+                for u in 0..self.width() {
+                    self.observe(scene, u, v);
+                }
+                unless_moving(rigid, rays, &self.disparities, &self.sigma, &mut self.velocity);
+            }
+        }
+        impacts(&self.velocity, dt_s, &mut self.looming, out);
+        match rigid {
+            Some(rigid) => {
+                let when = (&config.window, dt_s);
+                crossings(rigid, rays, when, &self.velocity[0], &self.looming[0], &mut self.crosses);
+            }
+            None => self.crosses.fill(false),
+        }
+    }
+
+    /// The disparities of one pixel.
+    #[inline(always)]
+    fn observe(&mut self, scene: &Scene<'_>, u: usize, v: usize) {
+        let pair = scene.pair;
+        self.disparities[0][u] = pair.rig.disparity_from_shift(f64::from(pair.before.shift.row(v)[u]));
+        self.sigma[u] = f64::from(pair.before.sigma.row(v)[u]);
+        match scene.moving.and_then(|moving| moving.disparities(pair, u, v)) {
+            // Then the rigid motion says nothing.
+            Some(own) => {
+                self.sigma[u] = f64::NAN;
+                self.set_disparities(u, own);
+            }
+            None => self.set_disparities(u, pair.disparities(u, v)),
+        }
+    }
+
+    fn set_disparities(&mut self, u: usize, disparities: Option<Gaussian<2>>) {
+        let Some(Gaussian { mean, cov }) = disparities else {
+            self.disparities[2][u] = f64::NAN;
+            return;
+        };
+        let values = [mean.x, cov.m11, mean.y, cov.m22, cov.m12];
+        for (plane, value) in self.disparities.iter_mut().zip(values) {
+            plane[u] = value;
+        }
+    }
+
+    fn set_velocity(&mut self, u: usize, velocity: Option<DepthVelocity>) {
+        let values = velocity.map_or([f64::NAN; 5], |velocity| parts(&velocity));
+        for (plane, value) in self.velocity.iter_mut().zip(values) {
+            plane[u] = value;
+        }
+    }
+
+    /// Number of pixels.
+    pub(super) fn width(&self) -> usize {
+        self.sigma.len()
+    }
+
+    /// Of pixel `u`, if it has an answer: its time to impact if it will cross the window.
+    pub(super) fn seen(&self, u: usize) -> Option<Option<TimeToImpact>> {
+        let [looming, variance] = &self.looming;
+        let impact = || TimeToImpact { looming: Gaussian::scalar(looming[u], variance[u]) };
+        (!self.velocity[1][u].is_nan()).then(|| self.crosses[u].then(impact))
+    }
+}
+
+/// VZ of a pixel as the configured method measures it.
+fn measured(pair: &DensePair<'_>, config: &Config, u: usize, v: usize) -> Option<DepthVelocity> {
+    let bf = pair.rig.depth_disparity_product();
+    match (config.method, config.approach) {
+        (Method::Dcce, Approach::Discrete) => {
+            Some(depth_velocity::dcce(&pair.depth_track(u, v)?.depth_change(bf)))
+        }
+        (Method::Dcce, Approach::Differential) => {
+            Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)).from_middle())
+        }
+        (Method::Dv, Approach::Differential) => {
+            Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf).from_middle())
+        }
+        _ => Some(DepthVelocity::from_disparities(&pair.disparities(u, v)?, bf)),
+    }
+}
+
+/// The planes' values of one pixel, as in [`MapRow`].
+#[inline(always)]
+fn parts(velocity: &DepthVelocity) -> [f64; 5] {
+    let Gaussian { mean, cov } = &velocity.z_vz;
+    [mean.x, mean.y, cov.m11, cov.m22, cov.m12]
+}
+
+#[inline(always)]
+fn whole([z, vz, z_variance, vz_variance, covariance]: [f64; 5]) -> DepthVelocity {
+    let cov = Matrix2::new(z_variance, covariance, covariance, vz_variance);
+    DepthVelocity { z_vz: Gaussian { mean: Vector2::new(z, vz), cov } }
+}
+
+vectorised! {
+/// The rigid prediction except where the measured change contradicts it.
+unless_moving(
+    rigid: &RigidPrediction<'_>,
+    rays: Rays<'_>,
+    disparities: &[Vec<f64>; 5],
+    sigma: &[f64],
+    out: &mut [Vec<f64>; 5],
+) {
+    let n = sigma.len();
+    let (baseline, bf) = (rays.rig.baseline_m, rays.rig.depth_disparity_product());
+    let [d, variance, later, later_variance, shared] = disparities.each_ref().map(|plane| &plane[..n]);
+    let [z, vz, z_variance, vz_variance, covariance] = out.each_mut().map(|plane| &mut plane[..n]);
+    for u in 0..n {
+        let point = rays.at(u) * (baseline / d[u]);
+        let still = rigid.depth_velocity_of(&point, d[u], sigma[u]);
+        let both = Gaussian { mean: Vector2::new(d[u], later[u]), cov: Matrix2::new(variance[u], shared[u], shared[u], later_variance[u]) };
+        let measured = DepthVelocity::from_disparities(&both, bf);
+        let (m, r) = (parts(&measured), parts(&still));
+        let predicted = (r[0] + r[1] > 0.0) & !r[3].is_nan();
+        let take = contradict(&measured, &still) | !predicted;
+        let known = (d[u] > 0.0) & !(if take { m[1] } else { r[1] }).is_nan();
+        let pick = |k: usize| {
+            let value = if take { m[k] } else { r[k] };
+            if known { value } else { f64::NAN }
+        };
+        (z[u], vz[u], z_variance[u], vz_variance[u], covariance[u]) =
+            (pick(0), pick(1), pick(2), pick(3), pick(4));
+    }
+}
+}
+
+vectorised! {
+/// VZ, its σ and time to impact with its interval; looming with its variance.
+impacts(velocity: &[Vec<f64>; 5], dt_s: f64, looming: &mut [Vec<f64>; 2], out: Output<'_>) {
+    let [a, b, c, d, e] = velocity.each_ref().map(Vec::as_slice);
+    let n = a.len();
+    let (a, b, c, d, e) = (&a[..n], &b[..n], &c[..n], &d[..n], &e[..n]);
+    let [rate, rate_variance] = looming.each_mut().map(|plane| &mut plane[..n]);
+    let [vz, sigma, seconds, lo, hi] = out;
+    let (vz, sigma, seconds) = (&mut vz[..n], &mut sigma[..n], &mut seconds[..n]);
+    let (lo, hi) = (&mut lo[..n], &mut hi[..n]);
+    for u in 0..n {
+        let velocity = whole([a[u], b[u], c[u], d[u], e[u]]);
+        let looming = velocity.looming_in_front(dt_s);
+        let impact = TimeToImpact { looming };
+        let ahead = a[u] + b[u] > 0.0;
+        let (fast, slow) = impact.rates95();
+        let approaches = ahead & (looming.value() > 0.0);
+        vz[u] = b[u] as f32;
+        sigma[u] = d[u].sqrt() as f32;
+        seconds[u] = if approaches { looming.value().recip() as f32 } else { f32::NAN };
+        lo[u] = if approaches { fast.recip() as f32 } else { f32::NAN };
+        hi[u] = if approaches { slow.max(0.0).recip() as f32 } else { f32::NAN };
+        rate[u] = if ahead { looming.value() } else { f64::NAN };
+        rate_variance[u] = looming.variance();
+    }
+}
+}
+
+vectorised! {
+/// Which points will pass through the vehicle's window.
+crossings(
+    rigid: &RigidPrediction<'_>,
+    rays: Rays<'_>,
+    when: (&VehicleWindow, f64),
+    z: &[f64],
+    looming: &[f64],
+    out: &mut [bool],
+) {
+    let n = z.len();
+    let ((window, dt_s), looming, out) = (when, &looming[..n], &mut out[..n]);
+    let (motion, per_focal, per_s) = (*rigid.motion(), rays.rig.focal_px.recip(), dt_s.recip());
+    for u in 0..n {
+        let before = rays.at(u) * (z[u] * per_focal);
+        let later = motion.apply(&before);
+        let velocity = (later - before) * per_s;
+        out[u] = (looming[u] > 0.0) & window.is_crossed_by(&later, &velocity, looming[u].recip());
+    }
+}
+}
