@@ -1,0 +1,238 @@
+//! Flow with a prediction: measured where it leads, and searched for where it is contradicted.
+//!
+//! A Lucas–Kanade step at the level where the search ends corrects the prediction, whose windows there
+//! are wide enough for what a prediction is wrong by; where grey levels contradict it still, the free
+//! search looks for a better match. One step at full resolution then measures.
+
+use super::claims::hide_claimed;
+use super::compare::Images;
+use super::free::coarse_to_fine;
+use super::refine::refine;
+use super::search::PATCH;
+use super::solve::Solved;
+use super::widen::widened;
+use super::{FlowField, FlowOptions, FlowPair, GUESS_SIGMA_PX};
+use crate::geometry::Grid;
+use crate::observe::planes::Planes;
+use crate::observe::spline;
+use rayon::prelude::*;
+
+/// Standard deviation by which the prediction damps the steps from it, in pixels of the level.
+const PREDICTION_SIGMA_PX: f32 = 0.5;
+/// A residual of so many times the image's median is no noise, in variances.
+const CONTRADICTION: f32 = 6.0;
+/// Side of the cells in which contradictions are gathered, in pixels of the search's finest level.
+const CELL: usize = 8;
+/// Contradicted pixels that make a cell worth a search.
+const FEW_CONTRADICTED: usize = 6;
+/// What the free search finds is taken only if its residual is lower by this factor: the prediction is
+/// the likelier.
+const CLEARLY_BETTER: f32 = 0.6;
+/// Corrections of neighbours that differ by less than this, in pixels of their level, are interpolated.
+const SAME_MOTION_PX: f32 = 0.5;
+
+/// What the step at the coarse level gives: answer (u, v, uu, uv, vv), correction of the prediction (u, v),
+/// and residual.
+pub(super) type Coarse = Planes<8>;
+/// Places among the planes of [`Coarse`].
+const CORRECTION: usize = 5;
+pub(super) const RESIDUAL: usize = 7;
+
+/// Flow from the prediction; `images` are those at full resolution.
+pub(super) fn flow(
+    pair: &FlowPair<'_>,
+    images: Images<'_>,
+    prediction: &FlowField,
+    options: &FlowOptions,
+) -> FlowField {
+    let levels = pair.levels();
+    let level = options.finest_search_level.min(levels.len() - 1);
+    let (from, to) = levels[level];
+    let coarse_images = Images { from, to: &spline::coefficients(to) };
+    let predicted = |y: usize, u: &mut [f32], v: &mut [f32]| predicted_row(prediction, level, y, u, v);
+
+    let mut coarse = corrected(coarse_images, &predicted, options, predicted);
+    let cells = contradicted_cells(&coarse);
+    if cells.values().contains(&true) {
+        let wanted = |at: usize, x: usize, y: usize| is_contradicted(&cells, at, level, (x, y));
+        let found = coarse_to_fine(&levels, Some(prediction), level, wanted, options);
+        let start = |y: usize, u: &mut [f32], v: &mut [f32]| {
+            u.copy_from_slice(found.u.row(y));
+            v.copy_from_slice(found.v.row(y));
+        };
+        let found = corrected(coarse_images, &predicted, options, start);
+        take_better(&mut coarse, &found, &cells);
+    }
+    hide_claimed(&mut coarse);
+    measured(images, prediction, &coarse, level, options)
+}
+
+/// The prediction of a row of a level, in its pixels; none where nothing is predicted.
+fn predicted_row(prediction: &FlowField, level: usize, y: usize, u: &mut [f32], v: &mut [f32]) {
+    let step = 1 << level;
+    let y = (y * step).min(prediction.u.height() - 1);
+    let scale = 1.0 / step as f32;
+    for (row, out) in [(prediction.u.row(y), u), (prediction.v.row(y), v)] {
+        for (out, value) in out.iter_mut().zip(row.iter().step_by(step)) {
+            *out = if value.is_nan() { 0.0 } else { scale * value };
+        }
+    }
+}
+
+/// One step from `start`.
+fn corrected(
+    images: Images<'_>,
+    predicted: impl Fn(usize, &mut [f32], &mut [f32]) + Sync,
+    options: &FlowOptions,
+    start: impl Fn(usize, &mut [f32], &mut [f32]) + Sync,
+) -> Coarse {
+    let (width, height) = images.from.size();
+    let mut out = Coarse::filled(width, height, f32::NAN);
+    refine(images, options, PREDICTION_SIGMA_PX, start, &mut out, |y, solved, out| {
+        let [u, v, uu, uv, vv, du, dv, residual] = out;
+        let Solved { moved_u, moved_v, .. } = solved;
+        for (to, from) in [u, v, uu, uv, vv, residual].into_iter().zip([
+            &solved.u,
+            &solved.v,
+            &solved.uu,
+            &solved.uv,
+            &solved.vv,
+            &solved.residual,
+        ]) {
+            to.copy_from_slice(&from[..width]);
+        }
+        predicted(y, du, dv);
+        for x in 0..width {
+            du[x] = moved_u[x] - du[x];
+            dv[x] = moved_v[x] - dv[x];
+        }
+    });
+    out
+}
+
+/// Cells where grey levels contradict the prediction.
+fn contradicted_cells(coarse: &Coarse) -> Grid<bool> {
+    let (width, height) = coarse.size();
+    let (columns, rows) = (width.div_ceil(CELL), height.div_ceil(CELL));
+    let mut sample: Vec<f32> = (0..height)
+        .step_by(3)
+        .flat_map(|y| coarse.row(RESIDUAL, y).iter().step_by(3).copied().filter(|r| r.is_finite()))
+        .collect();
+    let middle = sample.len() / 2;
+    if sample.is_empty() {
+        return Grid::filled(columns, rows, false);
+    }
+    let limit = CONTRADICTION * *sample.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let count = |column: usize, row: usize| {
+        let mut count = 0;
+        for y in row * CELL..((row + 1) * CELL).min(height) {
+            let here = column * CELL..((column + 1) * CELL).min(width);
+            let (residual, uu) = (&coarse.row(RESIDUAL, y)[here.clone()], &coarse.row(2, y)[here]);
+            // Refuted (NaN) though the window is all in the image, or explained badly.
+            let contradicts =
+                |(r, uu): (&f32, &f32)| r.is_finite() && *uu != f32::INFINITY && (uu.is_nan() || *r > limit);
+            count += residual.iter().zip(uu).filter(|&pixel| contradicts(pixel)).count();
+        }
+        count
+    };
+    let counts: Vec<bool> = (0..columns * rows)
+        .into_par_iter()
+        .with_min_len(64)
+        .map(|i| count(i % columns, i / columns) >= FEW_CONTRADICTED)
+        .collect();
+    Grid::from_values(columns, rows, counts).unwrap_or_else(|| Grid::filled(columns, rows, false))
+}
+
+/// Whether a patch of level `at` covers a contradicted cell of `level`.
+fn is_contradicted(cells: &Grid<bool>, at: usize, level: usize, (x, y): (usize, usize)) -> bool {
+    let scale = 1 << (at - level);
+    let range = |c: usize, n: usize| (c * scale / CELL).min(n)..((c + PATCH) * scale).div_ceil(CELL).min(n);
+    range(y, cells.height()).any(|row| cells.row(row)[range(x, cells.width())].contains(&true))
+}
+
+/// Take over what was found where it is clearly better.
+fn take_better(coarse: &mut Coarse, found: &Coarse, cells: &Grid<bool>) {
+    coarse.strips(CELL).into_par_iter().enumerate().for_each(|(row, mut planes)| {
+        let width = found.size().0;
+        for i in 0..planes[0].len() {
+            let (x, y) = (i % width, row * CELL + i / width);
+            let (old, new) = (planes[RESIDUAL][i], found.at(RESIDUAL, x, y));
+            let is_measured = !found.at(0, x, y).is_nan();
+            if cells.at(x / CELL, row) && is_measured && new < CLEARLY_BETTER * old {
+                for (n, plane) in planes.iter_mut().enumerate() {
+                    plane[i] = found.at(n, x, y);
+                }
+            }
+        }
+    });
+}
+
+/// The step at full resolution, from the prediction and its correction.
+fn measured(
+    images: Images<'_>,
+    prediction: &FlowField,
+    coarse: &Coarse,
+    level: usize,
+    options: &FlowOptions,
+) -> FlowField {
+    let (width, height) = images.from.size();
+    let start = |y: usize, u: &mut [f32], v: &mut [f32]| {
+        predicted_row(prediction, 0, y, u, v);
+        correct(coarse, level, y, u, v);
+    };
+    let mut flow = Planes::<5>::filled(width, height, f32::NAN);
+    refine(images, options, PREDICTION_SIGMA_PX, start, &mut flow, |y, solved, out| {
+        let rows = [&solved.u, &solved.v, &solved.uu, &solved.uv, &solved.vv];
+        let [u, v, uu, uv, vv] = out;
+        for (to, from) in [&mut *u, &mut *v, &mut *uu, &mut *uv, &mut *vv].into_iter().zip(rows) {
+            to.copy_from_slice(&from[..width]);
+        }
+        let residual = coarse.row(RESIDUAL, (y >> level).min(coarse.size().1 - 1));
+        for x in 0..width {
+            // What is hidden at the coarse level is so here.
+            let is_seen = residual[(x >> level).min(residual.len() - 1)] < f32::INFINITY;
+            if is_seen && !u[x].is_nan() {
+                continue;
+            }
+            let lacks_texture = solved.uu[x] == f32::INFINITY;
+            let wider = (is_seen && lacks_texture).then(|| widened(coarse, level, (x, y))).flatten();
+            let moved = (is_seen && lacks_texture).then(|| (solved.moved_u[x], solved.moved_v[x]));
+            let guess = || guess(prediction, (x, y), moved).filter(|_| options.fill);
+            [u[x], v[x], uu[x], uv[x], vv[x]] = wider.or_else(guess).unwrap_or([f32::NAN; 5]);
+        }
+    });
+    FlowField::from_planes(flow)
+}
+
+/// The prediction at a pixel, or what became of it, with a covariance that says that it is a guess.
+fn guess(prediction: &FlowField, (x, y): (usize, usize), moved: Option<(f32, f32)>) -> Option<[f32; 5]> {
+    let predicted = (prediction.u.get(x, y)?, prediction.v.get(x, y)?);
+    let (u, v) = moved.unwrap_or(predicted);
+    let least = GUESS_SIGMA_PX * GUESS_SIGMA_PX;
+    let (uu, uv, vv) = (prediction.cov_uu.at(x, y), prediction.cov_uv.at(x, y), prediction.cov_vv.at(x, y));
+    Some([u, v, uu + least, uv, vv + least])
+}
+
+/// Add the coarse level's corrections to a row of the prediction: bilinear within a motion, else the nearest.
+fn correct(coarse: &Coarse, level: usize, y: usize, u: &mut [f32], v: &mut [f32]) {
+    let scale = 1.0 / (1_usize << level) as f32;
+    let (right, bottom) = (coarse.size().0 - 1, coarse.size().1 - 1);
+    let fy = y as f32 * scale;
+    let y0 = (fy as usize).min(bottom);
+    let (y1, b) = ((y0 + 1).min(bottom), fy - y0 as f32);
+    let rows = [CORRECTION, CORRECTION + 1].map(|n| (coarse.row(n, y0), coarse.row(n, y1)));
+    for (x, (u, v)) in u.iter_mut().zip(v).enumerate() {
+        let fx = x as f32 * scale;
+        let x0 = (fx as usize).min(right);
+        let (x1, a) = ((x0 + 1).min(right), fx - x0 as f32);
+        for ((above, below), out) in rows.into_iter().zip([&mut *u, &mut *v]) {
+            let four = [above[x0], above[x1], below[x0], below[x1]];
+            let (low, high) =
+                four.iter().fold((f32::MAX, f32::MIN), |(low, high), &c| (low.min(c), high.max(c)));
+            let top = four[0] + a * (four[1] - four[0]);
+            let bottom = four[2] + a * (four[3] - four[2]);
+            let correction = if high - low < SAME_MOTION_PX { top + b * (bottom - top) } else { four[0] };
+            *out += correction / scale;
+        }
+    }
+}
