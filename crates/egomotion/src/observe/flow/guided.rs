@@ -32,11 +32,12 @@ const CLEARLY_BETTER: f32 = 0.6;
 const SAME_MOTION_PX: f32 = 0.5;
 
 /// What the step at the coarse level gives: answer (u, v, uu, uv, vv), correction of the prediction (u, v),
-/// and residual.
-pub(super) type Coarse = Planes<8>;
+/// and residual after and before the step.
+pub(super) type Coarse = Planes<9>;
 /// Places among the planes of [`Coarse`].
-const CORRECTION: usize = 5;
+pub(super) const CORRECTION: usize = 5;
 pub(super) const RESIDUAL: usize = 7;
+const BEFORE: usize = 8;
 
 /// Flow from the prediction; `images` are those at full resolution.
 pub(super) fn flow(
@@ -51,19 +52,28 @@ pub(super) fn flow(
     let coarse_images = Images { from, to: &spline::coefficients(to) };
     let predicted = |y: usize, u: &mut [f32], v: &mut [f32]| predicted_row(prediction, level, y, u, v);
 
-    let mut coarse = corrected(coarse_images, &predicted, options, predicted);
-    let cells = contradicted_cells(&coarse);
+    let mut coarse = corrected(coarse_images, predicted, predicted, options);
+    let cells = around(&contradicted_cells(&coarse));
+    let mut moving = Grid::filled(cells.width(), cells.height(), false);
     if cells.values().contains(&true) {
-        let wanted = |at: usize, x: usize, y: usize| is_contradicted(&cells, at, level, (x, y));
+        let wanted = |at: usize, x: usize, y: usize| covers(&cells, at - level, (x, y));
         let found = coarse_to_fine(&levels, Some(prediction), level, wanted, options);
         let start = |y: usize, u: &mut [f32], v: &mut [f32]| {
             u.copy_from_slice(found.u.row(y));
             v.copy_from_slice(found.v.row(y));
         };
-        let found = corrected(coarse_images, &predicted, options, start);
-        take_better(&mut coarse, &found, &cells);
+        let found = corrected(coarse_images, predicted, start, options);
+        moving = better_cells(&coarse, &found, &cells);
+        take_better(&mut coarse, &found, &cells, &moving);
     }
+    spread(&mut coarse, &moving);
+    let again = |y: usize, u: &mut [f32], v: &mut [f32]| {
+        predicted(y, u, v);
+        correct(&coarse, 0, y, u, v);
+    };
+    let mut coarse = corrected(coarse_images, predicted, again, options);
     hide_claimed(&mut coarse);
+    spread(&mut coarse, &moving);
     measured(images, prediction, &coarse, level, options)
 }
 
@@ -79,25 +89,26 @@ fn predicted_row(prediction: &FlowField, level: usize, y: usize, u: &mut [f32], 
     }
 }
 
-/// One step from `start`.
+/// One step from `start`, and what it makes of the prediction.
 fn corrected(
     images: Images<'_>,
     predicted: impl Fn(usize, &mut [f32], &mut [f32]) + Sync,
-    options: &FlowOptions,
     start: impl Fn(usize, &mut [f32], &mut [f32]) + Sync,
+    options: &FlowOptions,
 ) -> Coarse {
     let (width, height) = images.from.size();
     let mut out = Coarse::filled(width, height, f32::NAN);
     refine(images, options, PREDICTION_SIGMA_PX, start, &mut out, |y, solved, out| {
-        let [u, v, uu, uv, vv, du, dv, residual] = out;
+        let [u, v, uu, uv, vv, du, dv, residual, before] = out;
         let Solved { moved_u, moved_v, .. } = solved;
-        for (to, from) in [u, v, uu, uv, vv, residual].into_iter().zip([
+        for (to, from) in [u, v, uu, uv, vv, residual, before].into_iter().zip([
             &solved.u,
             &solved.v,
             &solved.uu,
             &solved.uv,
             &solved.vv,
             &solved.residual,
+            &solved.before,
         ]) {
             to.copy_from_slice(&from[..width]);
         }
@@ -143,28 +154,102 @@ fn contradicted_cells(coarse: &Coarse) -> Grid<bool> {
     Grid::from_values(columns, rows, counts).unwrap_or_else(|| Grid::filled(columns, rows, false))
 }
 
-/// Whether a patch of level `at` covers a contradicted cell of `level`.
-fn is_contradicted(cells: &Grid<bool>, at: usize, level: usize, (x, y): (usize, usize)) -> bool {
-    let scale = 1 << (at - level);
-    let range = |c: usize, n: usize| (c * scale / CELL).min(n)..((c + PATCH) * scale).div_ceil(CELL).min(n);
+/// Whether a patch, so many levels above that of the cells, covers one that is set.
+fn covers(cells: &Grid<bool>, above: usize, (x, y): (usize, usize)) -> bool {
+    let range = |c: usize, n: usize| ((c << above) / CELL).min(n)..((c + PATCH) << above).div_ceil(CELL).min(n);
     range(y, cells.height()).any(|row| cells.row(row)[range(x, cells.width())].contains(&true))
 }
 
-/// Take over what was found where it is clearly better.
-fn take_better(coarse: &mut Coarse, found: &Coarse, cells: &Grid<bool>) {
+/// The cells next to those that are set, and these.
+fn around(cells: &Grid<bool>) -> Grid<bool> {
+    Grid::from_fn(cells.width(), cells.height(), |column, row| {
+        (row.saturating_sub(1)..(row + 2).min(cells.height())).any(|row| {
+            cells.row(row)[column.saturating_sub(1)..(column + 2).min(cells.width())].contains(&true)
+        })
+    })
+}
+
+/// Cells which, with those around them, are clearly better explained by what was found.
+fn better_cells(coarse: &Coarse, found: &Coarse, cells: &Grid<bool>) -> Grid<bool> {
+    let (width, height) = coarse.size();
+    let sums = Grid::from_fn(cells.width(), cells.height(), |column, row| {
+        let mut sums = [0.0_f32; 2];
+        if cells.at(column, row) {
+            let here = column * CELL..((column + 1) * CELL).min(width);
+            for y in row * CELL..((row + 1) * CELL).min(height) {
+                let rows = coarse.row(BEFORE, y)[here.clone()].iter().zip(&found.row(BEFORE, y)[here.clone()]);
+                for (predicted, found) in rows.filter(|(a, b)| a.is_finite() && b.is_finite()) {
+                    sums = [sums[0] + predicted, sums[1] + found];
+                }
+            }
+        }
+        sums
+    });
+    Grid::from_fn(cells.width(), cells.height(), |column, row| {
+        let mut total = [0.0_f32; 2];
+        for row in row.saturating_sub(1)..(row + 2).min(cells.height()) {
+            for [predicted, found] in
+                &sums.row(row)[column.saturating_sub(1)..(column + 2).min(cells.width())]
+            {
+                total = [total[0] + predicted, total[1] + found];
+            }
+        }
+        cells.at(column, row) && total[1] < CLEARLY_BETTER * total[0]
+    })
+}
+
+/// Take over what was found where the prediction is refuted or clearly worse; in `moving` cells also where
+/// neither is measured.
+fn take_better(coarse: &mut Coarse, found: &Coarse, cells: &Grid<bool>, moving: &Grid<bool>) {
+    let width = found.size().0;
     coarse.strips(CELL).into_par_iter().enumerate().for_each(|(row, mut planes)| {
-        let width = found.size().0;
         for i in 0..planes[0].len() {
             let (x, y) = (i % width, row * CELL + i / width);
-            let (old, new) = (planes[RESIDUAL][i], found.at(RESIDUAL, x, y));
-            let is_measured = !found.at(0, x, y).is_nan();
-            if cells.at(x / CELL, row) && is_measured && new < CLEARLY_BETTER * old {
+            // What the prediction sends out of the image matches nothing in it but by accident.
+            if !cells.at(x / CELL, row) || planes[RESIDUAL][i] == f32::INFINITY {
+                continue;
+            }
+            let (old, new) = (planes[0][i], found.at(0, x, y));
+            let is_refuted = old.is_nan() && planes[2][i] != f32::INFINITY;
+            let is_better = found.at(RESIDUAL, x, y) < CLEARLY_BETTER * planes[RESIDUAL][i];
+            let is_taken = if new.is_nan() {
+                old.is_nan() && moving.at(x / CELL, row)
+            } else {
+                is_refuted || is_better
+            };
+            if is_taken {
                 for (n, plane) in planes.iter_mut().enumerate() {
                     plane[i] = found.at(n, x, y);
                 }
             }
         }
     });
+}
+
+/// What is not measured keeps the prediction, but in `moving` cells it moves as the cell does.
+fn spread(coarse: &mut Coarse, moving: &Grid<bool>) {
+    let width = coarse.size().0;
+    coarse.strips(CELL).into_par_iter().enumerate().for_each(|(row, planes)| {
+        let [u, _, _, _, _, du, dv, residual, _] = planes;
+        let cells: Vec<[f32; 2]> = (0..moving.width())
+            .map(|column| if moving.at(column, row) { typical([du, dv], width, column) } else { [0.0; 2] })
+            .collect();
+        for i in 0..u.len() {
+            if u[i].is_nan() || residual[i] == f32::INFINITY {
+                [du[i], dv[i]] = cells[i % width / CELL];
+            }
+        }
+    });
+}
+
+/// Medians of both components in a cell of a strip of rows.
+fn typical(components: [&[f32]; 2], width: usize, column: usize) -> [f32; 2] {
+    let columns = column * CELL..((column + 1) * CELL).min(width);
+    components.map(|values| {
+        let mut cell: Vec<f32> = values.chunks(width).flat_map(|row| row[columns.clone()].iter().copied()).collect();
+        let middle = cell.len() / 2;
+        *cell.select_nth_unstable_by(middle, f32::total_cmp).1
+    })
 }
 
 /// The step at full resolution, from the prediction and its correction.
@@ -197,17 +282,26 @@ fn measured(
             let lacks_texture = solved.uu[x] == f32::INFINITY;
             let wider = (is_seen && lacks_texture).then(|| widened(coarse, level, (x, y))).flatten();
             let moved = (is_seen && lacks_texture).then(|| (solved.moved_u[x], solved.moved_v[x]));
-            let guess = || guess(prediction, (x, y), moved).filter(|_| options.fill);
+            let guess = || guess(prediction, coarse, level, (x, y), moved).filter(|_| options.fill);
             [u[x], v[x], uu[x], uv[x], vv[x]] = wider.or_else(guess).unwrap_or([f32::NAN; 5]);
         }
     });
     FlowField::from_planes(flow)
 }
 
-/// The prediction at a pixel, or what became of it, with a covariance that says that it is a guess.
-fn guess(prediction: &FlowField, (x, y): (usize, usize), moved: Option<(f32, f32)>) -> Option<[f32; 5]> {
-    let predicted = (prediction.u.get(x, y)?, prediction.v.get(x, y)?);
-    let (u, v) = moved.unwrap_or(predicted);
+/// The prediction at a pixel, corrected, or what became of it, with a covariance that says that it is a guess.
+fn guess(
+    prediction: &FlowField,
+    coarse: &Coarse,
+    level: usize,
+    (x, y): (usize, usize),
+    moved: Option<(f32, f32)>,
+) -> Option<[f32; 5]> {
+    let (u, v) = (prediction.u.get(x, y)?, prediction.v.get(x, y)?);
+    let near = ((x >> level).min(coarse.size().0 - 1), (y >> level).min(coarse.size().1 - 1));
+    let scale = (1 << level) as f32;
+    let correction = [CORRECTION, CORRECTION + 1].map(|n| scale * coarse.at(n, near.0, near.1));
+    let (u, v) = moved.unwrap_or((u + correction[0], v + correction[1]));
     let least = GUESS_SIGMA_PX * GUESS_SIGMA_PX;
     let (uu, uv, vv) = (prediction.cov_uu.at(x, y), prediction.cov_uv.at(x, y), prediction.cov_vv.at(x, y));
     Some([u, v, uu + least, uv, vv + least])

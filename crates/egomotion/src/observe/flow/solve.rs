@@ -32,7 +32,8 @@ pub(super) struct Solved {
     /// Displacement after a damped step, everywhere: where the next iteration begins.
     pub moved_u: Vec<f32>,
     pub moved_v: Vec<f32>,
-    /// Variance of r after the step, in squared grey levels; infinite where too little is seen.
+    /// Variance of r before and after the step, in squared grey levels; infinite where too little is seen.
+    pub before: Vec<f32>,
     pub residual: Vec<f32>,
 }
 
@@ -49,6 +50,7 @@ impl Solved {
             vv: row(),
             moved_u: row(),
             moved_v: row(),
+            before: row(),
             residual: row(),
         }
     }
@@ -121,9 +123,10 @@ pub(super) fn solve(
         &mut solved.vv[here.clone()],
         &mut solved.moved_u[here.clone()],
         &mut solved.moved_v[here.clone()],
+        &mut solved.before[here.clone()],
         &mut solved.residual[here],
     ];
-    let [out_u, out_v, out_uu, out_uv, out_vv, moved_u, moved_v, out_residual] = rows;
+    let [out_u, out_v, out_uu, out_uv, out_vv, moved_u, moved_v, out_before, out_residual] = rows;
     let (at_u, at_v) = (&at.0[..TILE], &at.1[..TILE]);
     let s = settings;
     for i in 0..TILE {
@@ -140,6 +143,7 @@ pub(super) fn solve(
         let [du, dv] = step(g, floor, b);
         let residual = larger(before + du * b[0] + dv * b[1], 0.0);
         let covered = count >= MIN_COVERAGE;
+        out_before[i] = if covered { before } else { f32::INFINITY };
         out_residual[i] = if covered { residual } else { f32::INFINITY };
 
         let damping = larger(before, s.noise_variance) * s.prior_information / pixels;
