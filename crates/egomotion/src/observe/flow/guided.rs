@@ -13,12 +13,13 @@ use super::solve::Solved;
 use super::widen::widened;
 use super::{FlowField, FlowOptions, FlowPair, GUESS_SIGMA_PX};
 use crate::geometry::Grid;
+use crate::observe::dispatch::vectorised;
 use crate::observe::planes::Planes;
 use crate::observe::spline;
 use rayon::prelude::*;
 
 /// Standard deviation by which the prediction damps the steps from it, in pixels of the level.
-const PREDICTION_SIGMA_PX: f32 = 0.5;
+const PREDICTION_SIGMA_PX: f32 = 0.25;
 /// A residual of so many times the image's median is no noise, in variances.
 const CONTRADICTION: f32 = 6.0;
 /// Side of the cells in which contradictions are gathered, in pixels of the search's finest level.
@@ -211,11 +212,12 @@ fn take_better(coarse: &mut Coarse, found: &Coarse, cells: &Grid<bool>, moving: 
             }
             let (old, new) = (planes[0][i], found.at(0, x, y));
             let is_refuted = old.is_nan() && planes[2][i] != f32::INFINITY;
-            let is_better = found.at(RESIDUAL, x, y) < CLEARLY_BETTER * planes[RESIDUAL][i];
+            // A refuted step explains nothing: there what it began with counts.
+            let rival = planes[if is_refuted { BEFORE } else { RESIDUAL }][i];
             let is_taken = if new.is_nan() {
                 old.is_nan() && moving.at(x / CELL, row)
             } else {
-                is_refuted || is_better
+                found.at(RESIDUAL, x, y) < CLEARLY_BETTER * rival
             };
             if is_taken {
                 for (n, plane) in planes.iter_mut().enumerate() {
@@ -226,7 +228,8 @@ fn take_better(coarse: &mut Coarse, found: &Coarse, cells: &Grid<bool>, moving: 
     });
 }
 
-/// What is not measured keeps the prediction, but in `moving` cells it moves as the cell does.
+/// What is not measured keeps the prediction, but in `moving` cells it moves as the cell does unless it is
+/// hidden or leaves the image.
 fn spread(coarse: &mut Coarse, moving: &Grid<bool>) {
     let width = coarse.size().0;
     coarse.strips(CELL).into_par_iter().enumerate().for_each(|(row, planes)| {
@@ -235,7 +238,9 @@ fn spread(coarse: &mut Coarse, moving: &Grid<bool>) {
             .map(|column| if moving.at(column, row) { typical([du, dv], width, column) } else { [0.0; 2] })
             .collect();
         for i in 0..u.len() {
-            if u[i].is_nan() || residual[i] == f32::INFINITY {
+            if residual[i] == f32::INFINITY {
+                (du[i], dv[i]) = (0.0, 0.0);
+            } else if u[i].is_nan() {
                 [du[i], dv[i]] = cells[i % width / CELL];
             }
         }
@@ -310,23 +315,33 @@ fn guess(
 /// Add the coarse level's corrections to a row of the prediction: bilinear within a motion, else the nearest.
 fn correct(coarse: &Coarse, level: usize, y: usize, u: &mut [f32], v: &mut [f32]) {
     let scale = 1.0 / (1_usize << level) as f32;
-    let (right, bottom) = (coarse.size().0 - 1, coarse.size().1 - 1);
+    let bottom = coarse.size().1 - 1;
     let fy = y as f32 * scale;
     let y0 = (fy as usize).min(bottom);
     let (y1, b) = ((y0 + 1).min(bottom), fy - y0 as f32);
-    let rows = [CORRECTION, CORRECTION + 1].map(|n| (coarse.row(n, y0), coarse.row(n, y1)));
-    for (x, (u, v)) in u.iter_mut().zip(v).enumerate() {
-        let fx = x as f32 * scale;
-        let x0 = (fx as usize).min(right);
-        let (x1, a) = ((x0 + 1).min(right), fx - x0 as f32);
-        for ((above, below), out) in rows.into_iter().zip([&mut *u, &mut *v]) {
-            let four = [above[x0], above[x1], below[x0], below[x1]];
-            let (low, high) =
-                four.iter().fold((f32::MAX, f32::MIN), |(low, high), &c| (low.min(c), high.max(c)));
-            let top = four[0] + a * (four[1] - four[0]);
-            let bottom = four[2] + a * (four[3] - four[2]);
-            let correction = if high - low < SAME_MOTION_PX { top + b * (bottom - top) } else { four[0] };
-            *out += correction / scale;
+    for (n, out) in [(CORRECTION, u), (CORRECTION + 1, v)] {
+        add_between(coarse.row(n, y0), coarse.row(n, y1), b, level, out);
+    }
+}
+
+vectorised! {
+/// Add the values between two rows of a level, at the fraction `b` of the way.
+add_between(above: &[f32], below: &[f32], b: f32, level: usize, out: &mut [f32]) {
+    let step = 1 << level;
+    let scale = step as f32;
+    let right = above.len() - 1;
+    let below = &below[..=right];
+    for (x0, out) in out.chunks_mut(step).enumerate() {
+        let (x0, x1) = (x0.min(right), (x0 + 1).min(right));
+        let four = [above[x0], above[x1], below[x0], below[x1]];
+        let low = four[0].min(four[1]).min(four[2].min(four[3]));
+        let high = four[0].max(four[1]).max(four[2].max(four[3]));
+        let (left, next) = (four[0] + b * (four[2] - four[0]), four[1] + b * (four[3] - four[1]));
+        let is_one = high - low < SAME_MOTION_PX;
+        for (k, out) in out.iter_mut().enumerate() {
+            let between = left + k as f32 / scale * (next - left);
+            *out += scale * if is_one { between } else { four[0] };
         }
     }
+}
 }
