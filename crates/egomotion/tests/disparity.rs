@@ -182,8 +182,7 @@ fn what_is_filled_in_is_behind_and_says_that_it_is_a_guess() {
 
 #[test]
 fn area_correlation_answers_to_a_sixteenth() {
-    for (seed, plane) in (20..).zip([Plane(6.0, 0.04, 0.02), Plane(11.0, -0.01, 0.05)])
-    {
+    for (seed, plane) in (20..).zip([Plane(6.0, 0.04, 0.02), Plane(11.0, -0.01, 0.05)]) {
         let (left, right) = plane_pair(plane, 1.0, seed);
         let options = DisparityOptions { matcher: Matcher::AreaCorrelation, ..options() };
         let map = DisparityMatcher::new(options).compute(&left, &right).expect("one size");

@@ -135,7 +135,8 @@ mod tests {
 
     #[test]
     fn rows_are_what_spline_and_gradients_say() {
-        let image = |shift: usize| Grid::from_fn(90, 20, |u, v| ((u * 37 + v * 91 + u * v * shift) % 50) as f32);
+        let image =
+            |shift: usize| Grid::from_fn(90, 20, |u, v| ((u * 37 + v * 91 + u * v * shift) % 50) as f32);
         let (from, to) = (image(1), spline::coefficients(&image(2)));
         let slopes = gradients(&from);
         for y in [0, 7, 19] {

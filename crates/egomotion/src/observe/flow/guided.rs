@@ -22,13 +22,15 @@ use rayon::prelude::*;
 const PREDICTION_SIGMA_PX: f32 = 0.25;
 /// A residual of so many times the image's median is no noise, in variances.
 const CONTRADICTION: f32 = 6.0;
+/// The median that is believed at most, in variances of the least noise: a prediction may be all wrong.
+const LARGEST_MEDIAN: f32 = 16.0;
 /// Side of the cells in which contradictions are gathered, in pixels of the search's finest level.
 const CELL: usize = 8;
 /// Contradicted pixels that make a cell worth a search.
 const FEW_CONTRADICTED: usize = 6;
 /// What the free search finds is taken only if its residual is lower by this factor: the prediction is
 /// the likelier.
-const CLEARLY_BETTER: f32 = 0.6;
+const CLEARLY_BETTER: f32 = 0.5;
 /// Corrections of neighbours that differ by less than this, in pixels of their level, are interpolated.
 const SAME_MOTION_PX: f32 = 0.5;
 
@@ -54,7 +56,7 @@ pub(super) fn flow(
     let predicted = |y: usize, u: &mut [f32], v: &mut [f32]| predicted_row(prediction, level, y, u, v);
 
     let mut coarse = corrected(coarse_images, predicted, predicted, options);
-    let cells = around(&contradicted_cells(&coarse));
+    let cells = around(&contradicted_cells(&coarse, options.noise_floor));
     let mut moving = Grid::filled(cells.width(), cells.height(), false);
     if cells.values().contains(&true) {
         let wanted = |at: usize, x: usize, y: usize| covers(&cells, at - level, (x, y));
@@ -123,7 +125,7 @@ fn corrected(
 }
 
 /// Cells where grey levels contradict the prediction.
-fn contradicted_cells(coarse: &Coarse) -> Grid<bool> {
+fn contradicted_cells(coarse: &Coarse, noise: f32) -> Grid<bool> {
     let (width, height) = coarse.size();
     let (columns, rows) = (width.div_ceil(CELL), height.div_ceil(CELL));
     let mut sample: Vec<f32> = (0..height)
@@ -134,15 +136,15 @@ fn contradicted_cells(coarse: &Coarse) -> Grid<bool> {
     if sample.is_empty() {
         return Grid::filled(columns, rows, false);
     }
-    let limit = CONTRADICTION * *sample.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let median = *sample.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let limit = CONTRADICTION * median.min(LARGEST_MEDIAN * noise * noise);
     let count = |column: usize, row: usize| {
         let mut count = 0;
         for y in row * CELL..((row + 1) * CELL).min(height) {
             let here = column * CELL..((column + 1) * CELL).min(width);
             let (residual, uu) = (&coarse.row(RESIDUAL, y)[here.clone()], &coarse.row(2, y)[here]);
             // Refuted (NaN) though the window is all in the image, or explained badly.
-            let contradicts =
-                |(r, uu): (&f32, &f32)| r.is_finite() && *uu != f32::INFINITY && (uu.is_nan() || *r > limit);
+            let contradicts = |(r, uu): (&f32, &f32)| r.is_finite() && (uu.is_nan() || *r > limit);
             count += residual.iter().zip(uu).filter(|&pixel| contradicts(pixel)).count();
         }
         count
@@ -157,7 +159,8 @@ fn contradicted_cells(coarse: &Coarse) -> Grid<bool> {
 
 /// Whether a patch, so many levels above that of the cells, covers one that is set.
 fn covers(cells: &Grid<bool>, above: usize, (x, y): (usize, usize)) -> bool {
-    let range = |c: usize, n: usize| ((c << above) / CELL).min(n)..((c + PATCH) << above).div_ceil(CELL).min(n);
+    let range =
+        |c: usize, n: usize| ((c << above) / CELL).min(n)..((c + PATCH) << above).div_ceil(CELL).min(n);
     range(y, cells.height()).any(|row| cells.row(row)[range(x, cells.width())].contains(&true))
 }
 
@@ -178,7 +181,8 @@ fn better_cells(coarse: &Coarse, found: &Coarse, cells: &Grid<bool>) -> Grid<boo
         if cells.at(column, row) {
             let here = column * CELL..((column + 1) * CELL).min(width);
             for y in row * CELL..((row + 1) * CELL).min(height) {
-                let rows = coarse.row(BEFORE, y)[here.clone()].iter().zip(&found.row(BEFORE, y)[here.clone()]);
+                let rows =
+                    coarse.row(BEFORE, y)[here.clone()].iter().zip(&found.row(BEFORE, y)[here.clone()]);
                 for (predicted, found) in rows.filter(|(a, b)| a.is_finite() && b.is_finite()) {
                     sums = [sums[0] + predicted, sums[1] + found];
                 }
@@ -251,7 +255,8 @@ fn spread(coarse: &mut Coarse, moving: &Grid<bool>) {
 fn typical(components: [&[f32]; 2], width: usize, column: usize) -> [f32; 2] {
     let columns = column * CELL..((column + 1) * CELL).min(width);
     components.map(|values| {
-        let mut cell: Vec<f32> = values.chunks(width).flat_map(|row| row[columns.clone()].iter().copied()).collect();
+        let mut cell: Vec<f32> =
+            values.chunks(width).flat_map(|row| row[columns.clone()].iter().copied()).collect();
         let middle = cell.len() / 2;
         *cell.select_nth_unstable_by(middle, f32::total_cmp).1
     })

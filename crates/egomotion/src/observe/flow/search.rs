@@ -5,8 +5,8 @@
 
 use super::sampling::interpolate;
 use super::{Displacement, FlowField, FlowOptions};
-use crate::observe::dispatch::vectorised;
 use crate::geometry::{Grid, Image};
+use crate::observe::dispatch::vectorised;
 use crate::observe::pyramid::{Gradients, gradients};
 use rayon::prelude::*;
 

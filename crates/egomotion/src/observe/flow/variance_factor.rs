@@ -59,9 +59,8 @@ pub(super) fn variance_factor(
 /// The sample at column `x` of a row and the one below it; `None` where the second image has no counterpart.
 fn sample(here: &Differences, below: &Differences, x: usize) -> Option<Sample> {
     let places = [(here, x), (here, x + 1), (below, x)];
-    let product = |(row, k): (&Differences, usize)| {
-        here.slope_u[x] * row.slope_u[k] + here.slope_v[x] * row.slope_v[k]
-    };
+    let product =
+        |(row, k): (&Differences, usize)| here.slope_u[x] * row.slope_u[k] + here.slope_v[x] * row.slope_v[k];
     places.iter().all(|(row, k)| row.known[*k] > 0.0).then(|| Sample {
         residuals: places.map(|(row, k)| row.difference[k]),
         gradients: places.map(product),
