@@ -194,3 +194,36 @@ impl FlowPair<'_> {
         self.from.levels().iter().zip(self.to.levels()).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::Ordering;
+
+    use super::*;
+    use crate::observe::dispatch::tests::PLAIN;
+
+    #[test]
+    fn the_answer_depends_not_on_the_vectors() {
+        let grey = |u: f32, v: f32| {
+            100.0 + 30.0 * (0.31 * u + 0.12 * v).sin() * (0.2 * v).cos() + 40.0 * (0.07 * u - 0.09 * v).sin()
+        };
+        let image =
+            |shift: f32| Grid::from_fn(171, 93, |u, v| grey(u as f32 + shift, v as f32 - 0.3 * shift));
+        let [from, to] = [0.0, 1.7].map(|shift| Pyramid::new(image(shift), 4));
+        let plane = |value| Field::from_grid(Grid::filled(171, 93, value));
+        // Wrong on purpose: the search takes part.
+        let prediction = FlowField::prediction(plane(4.0), plane(0.0));
+        let bits = || {
+            [None, Some(&prediction)].map(|initial| {
+                let flow = dense_flow(&from, &to, initial, &FlowOptions::default()).unwrap();
+                [flow.u.grid(), flow.v.grid(), &flow.cov_uu, &flow.cov_uv, &flow.cov_vv]
+                    .map(|plane| plane.values().iter().map(|x| x.to_bits()).collect::<Vec<_>>())
+            })
+        };
+        let wide = bits();
+        PLAIN.store(true, Ordering::Relaxed);
+        let plain = bits();
+        PLAIN.store(false, Ordering::Relaxed);
+        assert!(wide == plain);
+    }
+}
