@@ -319,7 +319,8 @@ fn a_good_prediction_costs_no_accuracy_and_the_covariance_stays_true() {
         for noise in [2.0, 8.0] {
             let flow = flow_of(images(2, motion, noise, 0.0), Some(&prediction));
             let (density, error, scores) = judge(&flow, motion);
-            assert!(density > 0.8 && error <= 0.05 * noise);
+            // Zoom, rotation and shift send a tenth and more of the pixels out of the image.
+            assert!(density > 0.75 && error <= 0.05 * noise);
             assert!(scores.iter().all(|s| (0.7..=1.4).contains(s)), "{scores:?}");
         }
     }

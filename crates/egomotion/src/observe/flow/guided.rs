@@ -30,7 +30,7 @@ const CELL: usize = 8;
 const FEW_CONTRADICTED: usize = 6;
 /// What the free search finds is taken only if its residual is lower by this factor: the prediction is
 /// the likelier.
-const CLEARLY_BETTER: f32 = 0.5;
+const CLEARLY_BETTER: f32 = 0.6;
 /// Corrections of neighbours that differ by less than this, in pixels of their level, are interpolated.
 const SAME_MOTION_PX: f32 = 0.5;
 
@@ -56,7 +56,12 @@ pub(super) fn flow(
     let predicted = |y: usize, u: &mut [f32], v: &mut [f32]| predicted_row(prediction, level, y, u, v);
 
     let mut coarse = corrected(coarse_images, predicted, predicted, options);
-    let cells = around(&contradicted_cells(&coarse, options.noise_floor));
+    let contradicted = contradicted_cells(&coarse, options.noise_floor);
+    // A prediction that most of the image contradicts is none.
+    if 2 * contradicted.values().iter().filter(|&&is| is).count() > contradicted.values().len() {
+        return super::free::flow(pair, images, options);
+    }
+    let cells = around(&contradicted);
     let mut moving = Grid::filled(cells.width(), cells.height(), false);
     if cells.values().contains(&true) {
         let wanted = |at: usize, x: usize, y: usize| covers(&cells, at - level, (x, y));
@@ -137,14 +142,18 @@ fn contradicted_cells(coarse: &Coarse, noise: f32) -> Grid<bool> {
         return Grid::filled(columns, rows, false);
     }
     let median = *sample.select_nth_unstable_by(middle, f32::total_cmp).1;
-    let limit = CONTRADICTION * median.min(LARGEST_MEDIAN * noise * noise);
+    let largest = CONTRADICTION * LARGEST_MEDIAN * noise * noise;
+    let limit = largest.min(CONTRADICTION * median);
     let count = |column: usize, row: usize| {
         let mut count = 0;
         for y in row * CELL..((row + 1) * CELL).min(height) {
             let here = column * CELL..((column + 1) * CELL).min(width);
             let (residual, uu) = (&coarse.row(RESIDUAL, y)[here.clone()], &coarse.row(2, y)[here]);
             // Refuted (NaN) though the window is all in the image, or explained badly.
-            let contradicts = |(r, uu): (&f32, &f32)| r.is_finite() && (uu.is_nan() || *r > limit);
+            // Without texture (infinite) only what no noise explains counts.
+            let contradicts = |(r, uu): (&f32, &f32)| {
+                r.is_finite() && (uu.is_nan() || *r > if *uu == f32::INFINITY { largest } else { limit })
+            };
             count += residual.iter().zip(uu).filter(|&pixel| contradicts(pixel)).count();
         }
         count
