@@ -1,7 +1,7 @@
 //! Dense flow on synthetic images whose motion is known exactly.
 
 use egomotion::geometry::{Field, Grid, Image};
-use egomotion::observe::flow::{FlowError, FlowField, FlowOptions, dense_flow};
+use egomotion::observe::flow::{FlowError, FlowField, FlowOptions, GUESS_SIGMA_PX, dense_flow};
 use egomotion::observe::pyramid::Pyramid;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
@@ -237,4 +237,91 @@ fn what_cannot_be_compared_is_refused() {
     assert_eq!(dense_flow(&pyramid(30), &pyramid(30), Some(&prediction), &options), mismatch);
     let options = FlowOptions { patch_stride_px: 0, ..options };
     assert!(matches!(dense_flow(&pyramid(30), &pyramid(30), None, &options), Err(FlowError::Option(_))));
+}
+
+/// A textured square of 56 pixels that moves by itself in front of a still world that moves by `world`.
+fn with_object(world: Motion, object: Motion, noise: f64) -> [Image; 2] {
+    let [mut first, mut second] = images(11, world, noise, 0.0);
+    let [one, two] = images(12, object, noise, 0.0);
+    for y in 0..SIZE.1 {
+        for x in 0..SIZE.0 {
+            if in_object(x as f64, y as f64) {
+                first.set(x, y, one.at(x, y));
+            }
+            let [u, v] = object.inverse(x as f64, y as f64);
+            if in_object(u, v) {
+                second.set(x, y, two.at(x, y));
+            }
+        }
+    }
+    [first, second]
+}
+
+fn in_object(x: f64, y: f64) -> bool {
+    (50.0..106.0).contains(&x) && (30.0..86.0).contains(&y)
+}
+
+#[test]
+fn what_moves_by_itself_is_found_though_the_prediction_says_otherwise() {
+    let (world, object) = (Motion::shift(2.3, -0.6), Motion::shift(-4.2, 3.1));
+    let plane = |value| Field::from_grid(Grid::filled(SIZE.0, SIZE.1, value));
+    let prediction = FlowField::prediction(plane(2.1), plane(-0.5));
+    let flow = flow_of(with_object(world, object, 2.0), Some(&prediction));
+    let mut found = [vec![], vec![]];
+    for y in 0..SIZE.1 {
+        for x in 0..SIZE.0 {
+            // Windows near the object's edge see both motions.
+            let near = |margin: f64| {
+                (50.0 + margin..106.0 - margin).contains(&(x as f64))
+                    && (30.0 + margin..86.0 - margin).contains(&(y as f64))
+            };
+            let (moves, is_clear) = (in_object(x as f64, y as f64), near(10.0) || !near(-16.0));
+            if is_clear {
+                let truth = if moves { object } else { world }.displacement(x as f64, y as f64);
+                let answer = flow.get(x, y).map_or(f64::INFINITY, |answer| {
+                    (answer.mean[0] - truth[0]).hypot(answer.mean[1] - truth[1])
+                });
+                found[usize::from(moves)].push(answer);
+            }
+        }
+    }
+    let [still, moving] = found.map(median);
+    println!("median error of the world {still:.4} px, of the object {moving:.4} px");
+    assert!(still <= 0.1 && moving <= 0.1);
+}
+
+#[test]
+fn the_prediction_stands_in_as_a_guess_where_nothing_can_be_measured() {
+    let flat = || Grid::filled(64, 48, 99.0);
+    let plane = |value| Field::from_grid(Grid::filled(64, 48, value));
+    let mut prediction = FlowField::prediction(plane(1.5), plane(-2.0));
+    prediction.u.set(20, 10, None);
+    let flow = flow_of([flat(), flat()], Some(&prediction));
+    assert_eq!(flow.u.count(), 64 * 48 - 1);
+    for (x, y) in [(0, 0), (31, 20), (63, 47)] {
+        assert_eq!((flow.u.get(x, y), flow.v.get(x, y)), (Some(1.5), Some(-2.0)));
+        assert!(flow.get(x, y).is_none(), "a guess is no measurement");
+        assert!(flow.cov_uu.at(x, y) >= GUESS_SIGMA_PX.powi(2));
+    }
+    let options = FlowOptions { fill: false, ..FlowOptions::default() };
+    let [a, b] = [flat(), flat()].map(|image| Pyramid::new(image, 6));
+    assert_eq!(dense_flow(&a, &b, Some(&prediction), &options).unwrap().u.count(), 0);
+}
+
+#[test]
+fn a_good_prediction_costs_no_accuracy_and_the_covariance_stays_true() {
+    for motion in [Motion::shift(-3.3, 2.6), ROTATION_AND_ZOOM] {
+        let plane = |i: usize| {
+            let value = |x, y| motion.displacement(x as f64, y as f64)[i] as f32 + 0.2;
+            Field::from_grid(Grid::from_fn(SIZE.0, SIZE.1, value))
+        };
+        let prediction = FlowField::prediction(plane(0), plane(1));
+        for noise in [2.0, 8.0] {
+            let flow = flow_of(images(2, motion, noise, 0.0), Some(&prediction));
+            let (density, error, scores) = judge(&flow, motion);
+            // Zoom, rotation and shift send a tenth and more of the pixels out of the image.
+            assert!(density > 0.75 && error <= 0.05 * noise);
+            assert!(scores.iter().all(|s| (0.7..=1.4).contains(s)), "{scores:?}");
+        }
+    }
 }

@@ -41,7 +41,7 @@ pub(crate) fn has_avx2() -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::sync::atomic::{AtomicBool, Ordering};
 
     use crate::geometry::{Grid, StereoRig};
@@ -49,7 +49,7 @@ mod tests {
     use crate::observe::tracks::{Hints, TrackOptions, stereo_tracks};
 
     /// Tests that run at the same time may be switched as well: their answers are the same.
-    pub(super) static PLAIN: AtomicBool = AtomicBool::new(false);
+    pub(in crate::observe) static PLAIN: AtomicBool = AtomicBool::new(false);
 
     #[test]
     fn wide_and_plain_kernels_give_the_same_bits() {

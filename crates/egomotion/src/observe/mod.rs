@@ -7,6 +7,7 @@ pub mod flow;
 mod follow;
 pub mod observation;
 pub mod patch;
+pub(crate) mod planes;
 pub mod pyramid;
 pub mod row_disagreement;
 mod row_search;

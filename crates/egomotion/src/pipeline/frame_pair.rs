@@ -9,13 +9,14 @@ use super::stereo::{StageTimes, Unanswered};
 use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood, robust_start};
 use crate::estimate::systematic::common_errors;
 use crate::estimate::{MotionEstimate, Unsolvable};
-use crate::geometry::{Field, Grid, RigidMotion, StereoRig, Twist};
+use crate::geometry::{Grid, StereoRig, Twist};
 use crate::motion::TimeToImpact;
 use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
 use crate::motion::impact::nearest;
+use crate::observe::flow::{Camera, FlowPair, rigid_flow};
 use crate::observe::row_disagreement::row_disagreement;
 use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};
-use crate::observe::{DensePair, DisparityMap, FlowField, Pyramid, StereoPyramid, StereoTrack, dense_flow};
+use crate::observe::{DensePair, DisparityMap, FlowField, FlowOptions, StereoPyramid, StereoTrack};
 
 /// Standard deviation of an offset of disparity per pixel by which rows disagree.
 ///
@@ -183,19 +184,8 @@ impl FramePair<'_> {
         let both = differential && matches!(self.config.method, Method::Dv | Method::Joint | Method::Ml);
         let prediction = rough.as_ref().ok();
         let (flow, right) = timed(&mut stages.flow_ms, || {
-            let images = (&self.before.images, &self.after.images);
-            let left = self.flow(
-                &images.0.left,
-                &images.1.left,
-                prediction.map(|phi| self.rigid_flow(before, phi, false)),
-            );
-            let right = both.then(|| {
-                self.flow(
-                    &images.0.right,
-                    &images.1.right,
-                    prediction.map(|phi| self.rigid_flow(before, phi, true)),
-                )
-            });
+            let left = self.flow(Camera::Left, before, prediction);
+            let right = both.then(|| self.flow(Camera::Right, before, prediction));
             (left, right.flatten())
         });
         let Some(flow) = flow else {
@@ -242,33 +232,18 @@ impl FramePair<'_> {
         RigidPrediction::new(&motion.theta, offset, self.rig)
     }
 
-    fn flow(&self, from: &Pyramid, to: &Pyramid, initial: Option<FlowField>) -> Option<FlowField> {
-        dense_flow(from, to, initial.as_ref(), &self.config.flow).ok()
-    }
-
-    /// The flow of the still world under φ, on the pixel grid of the left or the right camera.
-    fn rigid_flow(&self, before: &DisparityMap, phi: &Twist, right: bool) -> FlowField {
-        let (width, height) = before.shift.size();
-        let mut flow = (Field::missing(width, height), Field::missing(width, height));
-        let motion: RigidMotion = phi.exp();
-        for v in 0..height {
-            for u in 0..width {
-                let Some(shift) = before.shift.get(u, v).map(f64::from) else { continue };
-                let d = self.rig.disparity_from_shift(shift);
-                let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
-                let point = self.rig.point(&nalgebra::Vector3::new(x, y, d));
-                let Some(after) = point.and_then(|p| self.rig.project(&motion.apply(&p))) else { continue };
-                let (u_after, v_after) = self.rig.pixel_from_image(after.x, after.y);
-                let (du, dv) = (u_after - u as f64, (v_after - v as f64) as f32);
-                let (at, du) =
-                    if right { ((u as f64 - shift).round(), du - (after.z - d)) } else { (u as f64, du) };
-                if at >= 0.0 && at < width as f64 {
-                    flow.0.set(at as usize, v, Some(du as f32));
-                    flow.1.set(at as usize, v, Some(dv));
-                }
-            }
-        }
-        FlowField::prediction(flow.0, flow.1)
+    /// Flow of one camera; what is not measured but predicted counts for the left one only, for the right
+    /// one's is read between its pixels.
+    fn flow(&self, camera: Camera, before: &DisparityMap, phi: Option<&Twist>) -> Option<FlowField> {
+        let (a, b) = (&self.before.images, &self.after.images);
+        let (from, to, spline) = match camera {
+            Camera::Left => (&a.left, &b.left, &b.left_spline),
+            Camera::Right => (&a.right, &b.right, &b.right_spline),
+        };
+        let initial = phi.map(|phi| rigid_flow(before, self.rig, phi, camera));
+        let fill = self.config.flow.fill && camera == Camera::Left;
+        let options = FlowOptions { fill, ..self.config.flow.clone() };
+        FlowPair { from, to, to_spline: Some(spline) }.flow(initial.as_ref(), &options).ok()
     }
 }
 

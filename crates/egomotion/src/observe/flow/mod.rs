@@ -1,28 +1,44 @@
 //! Dense optical flow with its covariance.
 //!
-//! Coarse to fine by dense inverse search (`search`: small patches, inverse-compositional, after
-//! Kroeger et al., ECCV 2016, made dense by photometric weights in `densify`), then a windowed
-//! Lucas–Kanade step per pixel (`refine`) which gives the sub-pixel accuracy and the covariance: at the
-//! level where the search ends, and at full resolution; where the latter has not enough texture the
+//! Freely (`free`): coarse to fine by dense inverse search (`search`: small patches, inverse-compositional,
+//! after Kroeger et al., ECCV 2016, made dense by photometric weights in `densify`), then a windowed
+//! Lucas–Kanade step per pixel (`refine`, `solve`) which gives the sub-pixel accuracy and the covariance: at
+//! the level where the search ends, and at full resolution; where the latter has not enough texture the
 //! former's wider window answers (`widen`). What backward flow contradicts (`consistency`) stays missing.
+//!
+//! With a prediction (`guided`, `rigid`) the Lucas–Kanade steps begin with it, and only what contradicts
+//! it is searched for freely.
 
+mod claims;
+mod compare;
 mod consistency;
-mod correlation;
 mod densify;
+mod free;
+mod guided;
 mod options;
 mod refine;
+mod rigid;
 mod sampling;
 mod search;
-mod select;
 mod smooth;
+mod solve;
+mod variance_factor;
 mod widen;
-mod window;
 
 pub use options::FlowOptions;
+pub use rigid::{Camera, rigid_flow};
 
 use crate::geometry::{Field, Gaussian, Grid, Image};
+use crate::observe::planes::Planes;
 use crate::observe::pyramid::Pyramid;
+use crate::observe::spline;
 use nalgebra::{Matrix2, Vector2};
+
+/// Standard deviation from which on a displacement is a guess and no measurement, in pixels: what was
+/// predicted and could not be measured.
+///
+/// Such values tell where pixels go; motion is not to be estimated from them.
+pub const GUESS_SIGMA_PX: f32 = 1.0;
 
 /// Displacement of each pixel from one image to another, with its covariance.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,11 +79,21 @@ impl FlowField {
         self.u.size()
     }
 
-    /// Displacement at pixel (u, v), which must lie inside, with its covariance, in pixels.
+    fn from_planes(planes: Planes<5>) -> Self {
+        let [u, v, cov_uu, cov_uv, cov_vv] = planes.into_grids();
+        Self { u: Field::from_grid(u), v: Field::from_grid(v), cov_uu, cov_uv, cov_vv }
+    }
+
+    /// Displacement measured at pixel (u, v), which must lie inside, with its covariance, in pixels; guesses
+    /// (see [`GUESS_SIGMA_PX`]) are none.
     pub fn get(&self, u: usize, v: usize) -> Option<Gaussian<2>> {
+        let (uu, vv) = (self.cov_uu.at(u, v), self.cov_vv.at(u, v));
+        if uu.max(vv) >= GUESS_SIGMA_PX * GUESS_SIGMA_PX {
+            return None;
+        }
         let mean = Vector2::new(self.u.get(u, v)?.into(), self.v.get(u, v)?.into());
         let uv = f64::from(self.cov_uv.at(u, v));
-        let cov = Matrix2::new(self.cov_uu.at(u, v).into(), uv, uv, self.cov_vv.at(u, v).into());
+        let cov = Matrix2::new(uu.into(), uv, uv, vv.into());
         Some(Gaussian { mean, cov })
     }
 }
@@ -95,49 +121,14 @@ struct Displacement {
     v: Grid<f32>,
 }
 
-/// A pixel's displacement with its covariance (uu, uv, vv); without an answer all of it is NaN, or the
-/// covariance infinite.
-#[derive(Debug, Clone, Copy)]
-struct Answer {
-    u: f32,
-    v: f32,
-    cov: [f32; 3],
-}
-
-impl Answer {
-    /// Nothing is known, for want of texture: a wider window may know more.
-    const UNKNOWN: Self = Self { u: f32::NAN, v: f32::NAN, cov: [f32::INFINITY; 3] };
-    /// What was found has been refuted.
-    const REFUTED: Self = Self { u: f32::NAN, v: f32::NAN, cov: [f32::NAN; 3] };
-}
-
-impl FlowField {
-    fn from_answers(answers: &Grid<Answer>) -> Self {
-        let (width, height) = answers.size();
-        let plane = |f: fn(&Answer) -> f32| {
-            let mut plane = Grid::filled(width, height, f32::NAN);
-            let known = plane.values_mut().iter_mut().zip(answers.values()).filter(|(_, a)| !a.u.is_nan());
-            known.for_each(|(p, a)| *p = f(a));
-            plane
-        };
-        Self {
-            u: Field::from_grid(plane(|a| a.u)),
-            v: Field::from_grid(plane(|a| a.v)),
-            cov_uu: plane(|a| a.cov[0]),
-            cov_uv: plane(|a| a.cov[1]),
-            cov_vv: plane(|a| a.cov[2]),
-        }
-    }
-}
-
 /// Flow of `from` to `to`, on the pixel grid of `from`, displacement (to − from) in pixels.
 ///
-/// `initial` predicts the flow at some or all pixels (for example from rigid motion and disparity). It
-/// competes with what is found coarse to fine; at each pixel the smaller photometric residual wins, so
-/// that what moves by itself is found all the same.
+/// `initial` predicts the flow at some or all pixels, as [`rigid_flow`] does from disparity and motion. The
+/// search begins there, and what moves by itself is searched for freely; where nothing can be measured the
+/// prediction stands in as a guess ([`GUESS_SIGMA_PX`]) if [`FlowOptions::fill`] says so.
 ///
 /// Pixels without texture in two directions, with a residual too large, that leave the image, or of
-/// which the backward flow disagrees are missing. The errors of neighbours are correlated, see
+/// which the backward flow disagrees are not measured. The errors of neighbours are correlated, see
 /// [`FlowOptions::correlation_area_px`]. The answer does not depend on the number of threads.
 ///
 /// # Errors
@@ -149,66 +140,90 @@ pub fn dense_flow(
     initial: Option<&FlowField>,
     options: &FlowOptions,
 ) -> Result<FlowField, FlowError> {
-    options.check()?;
-    let size = from.size();
-    for other in std::iter::once(to.size()).chain(initial.map(FlowField::size)) {
-        if other != size {
-            return Err(FlowError::SizeMismatch { from: size, to: other });
-        }
-    }
-    let (Some(first), Some(second)) = (from.levels().first(), to.levels().first()) else {
-        return Ok(FlowField::missing(0, 0));
-    };
-    if size.0.min(size.1) < search::PATCH {
-        return Ok(FlowField::missing(size.0, size.1));
-    }
-
-    let coarsest = from.levels().len().min(to.levels().len()) - 1;
-    let finest = options.finest_search_level.min(coarsest);
-    let found = coarse_to_fine(from, to, initial, finest, options);
-    let wide = (finest > 0).then(|| {
-        let (a, b) = (&from.levels()[finest], &to.levels()[finest]);
-        refine::refine(a, b, found.clone(), options)
-    });
-    let found = densify::enlarge(found, finest, size);
-    let start = match initial {
-        Some(prediction) => select::better(first, second, found, prediction, options),
-        None => found,
-    };
-    let mut flow = refine::refine(first, second, start, options);
-    if let Some(wide) = &wide {
-        widen::widen(&mut flow, wide, finest);
-    }
-
-    if options.consistency_px.is_finite() {
-        let coarse = options.consistency_level.min(coarsest);
-        let reverse = initial.map(consistency::reverse);
-        let backward = coarse_to_fine(to, from, reverse.as_ref(), coarse, options);
-        consistency::reject(&mut flow, &backward, coarse, options.consistency_px);
-    }
-    Ok(FlowField::from_answers(&flow))
+    FlowPair { from, to, to_spline: None }.flow(initial, options)
 }
 
-/// Dense inverse search from the coarsest level both pyramids have down to level `finest`; the
-/// displacement is in pixels of that level.
-fn coarse_to_fine(
-    from: &Pyramid,
-    to: &Pyramid,
-    initial: Option<&FlowField>,
-    finest: usize,
-    options: &FlowOptions,
-) -> Displacement {
-    let levels: Vec<(&Image, &Image)> = from.levels().iter().zip(to.levels()).collect();
-    let coarsest = levels.len() - 1;
-    let mut flow: Option<Displacement> = None;
-    for (level, (a, b)) in levels.iter().enumerate().skip(finest).rev() {
-        let prediction = initial.filter(|_| level <= options.initial_level.max(finest)).map(|f| (f, level));
-        let pair = search::Pair::new(a, b);
-        let patches = search::search(&pair, flow.as_ref(), prediction, level == coarsest, options);
-        flow = Some(densify::densify(&pair, &patches));
+/// Two images between which there is flow.
+#[derive(Debug, Clone, Copy)]
+pub struct FlowPair<'a> {
+    /// The first image.
+    pub from: &'a Pyramid,
+    /// The second image.
+    pub to: &'a Pyramid,
+    /// Spline coefficients of the second image, if they are there already.
+    pub to_spline: Option<&'a Image>,
+}
+
+impl FlowPair<'_> {
+    /// [`dense_flow`].
+    ///
+    /// # Errors
+    /// As those of [`dense_flow`].
+    pub fn flow(&self, initial: Option<&FlowField>, options: &FlowOptions) -> Result<FlowField, FlowError> {
+        options.check()?;
+        let size = self.from.size();
+        let others = [self.to.size()].into_iter().chain(initial.map(FlowField::size));
+        for other in others.chain(self.to_spline.map(Image::size)) {
+            if other != size {
+                return Err(FlowError::SizeMismatch { from: size, to: other });
+            }
+        }
+        let (Some(from), Some(to)) = (self.from.levels().first(), self.to.levels().first()) else {
+            return Ok(FlowField::missing(0, 0));
+        };
+        if size.0.min(size.1) < search::PATCH {
+            return Ok(FlowField::missing(size.0, size.1));
+        }
+        let coefficients;
+        let to = match self.to_spline {
+            Some(there) => there,
+            None => {
+                coefficients = spline::coefficients(to);
+                &coefficients
+            }
+        };
+        let images = compare::Images { from, to };
+        Ok(match initial {
+            Some(prediction) => guided::flow(self, images, prediction, options),
+            None => free::flow(self, images, options),
+        })
     }
-    flow.unwrap_or_else(|| {
-        let zero = Grid::filled(from.size().0, from.size().1, 0.0);
-        Displacement { u: zero.clone(), v: zero }
-    })
+
+    /// Levels that both images have.
+    fn levels(&self) -> Vec<(&Image, &Image)> {
+        self.from.levels().iter().zip(self.to.levels()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::Ordering;
+
+    use super::*;
+    use crate::observe::dispatch::tests::PLAIN;
+
+    #[test]
+    fn the_answer_depends_not_on_the_vectors() {
+        let grey = |u: f32, v: f32| {
+            100.0 + 30.0 * (0.31 * u + 0.12 * v).sin() * (0.2 * v).cos() + 40.0 * (0.07 * u - 0.09 * v).sin()
+        };
+        let image =
+            |shift: f32| Grid::from_fn(171, 93, |u, v| grey(u as f32 + shift, v as f32 - 0.3 * shift));
+        let [from, to] = [0.0, 1.7].map(|shift| Pyramid::new(image(shift), 4));
+        let plane = |value| Field::from_grid(Grid::filled(171, 93, value));
+        // Wrong on purpose: the search takes part.
+        let prediction = FlowField::prediction(plane(4.0), plane(0.0));
+        let bits = || {
+            [None, Some(&prediction)].map(|initial| {
+                let flow = dense_flow(&from, &to, initial, &FlowOptions::default()).unwrap();
+                [flow.u.grid(), flow.v.grid(), &flow.cov_uu, &flow.cov_uv, &flow.cov_vv]
+                    .map(|plane| plane.values().iter().map(|x| x.to_bits()).collect::<Vec<_>>())
+            })
+        };
+        let wide = bits();
+        PLAIN.store(true, Ordering::Relaxed);
+        let plain = bits();
+        PLAIN.store(false, Ordering::Relaxed);
+        assert!(wide == plain);
+    }
 }

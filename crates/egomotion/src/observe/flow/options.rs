@@ -16,11 +16,11 @@ pub struct FlowOptions {
     /// Level at which the search ends (0: full resolution) and the refinement begins; its answer there
     /// stands in where full resolution has not enough texture.
     pub finest_search_level: usize,
-    /// Coarsest level at which the initial flow takes part in the search.
-    pub initial_level: usize,
+    /// Whether the initial flow stands in, as a guess, where nothing can be measured.
+    pub fill: bool,
     /// Radius of the window of the refinement, 1 … 15 pixels.
     pub window_radius_px: usize,
-    /// Iterations of the refinement, at least 1.
+    /// Iterations of the refinement at full resolution, at least 1; with an initial flow it is always one.
     pub refine_iterations: usize,
     /// Standard deviation of the difference of two grey values when nothing is wrong: least value of
     /// what is estimated locally from the residual.
@@ -28,15 +28,15 @@ pub struct FlowOptions {
     /// Standard deviation added to each component for what the residual does not show (interpolation,
     /// aliasing), in pixels.
     pub sigma_floor_px: f32,
-    /// A pixel is missing if the larger semi-axis of its covariance exceeds this, in pixels.
+    /// A pixel is not measured if the larger semi-axis of its covariance exceeds this, in pixels.
     pub max_sigma_px: f32,
-    /// A pixel is missing if the gradient energy along the weakest direction of its window is not this
+    /// A pixel is not measured if the gradient energy along the weakest direction of its window is not this
     /// many times what noise of the size of the residual makes by itself.
     pub min_texture: f32,
-    /// A pixel is missing if the residual of its window exceeds this root mean square, in grey levels.
+    /// A pixel is not measured if the residual of its window exceeds this root mean square, in grey levels.
     pub max_residual: f32,
-    /// A pixel is missing if forward and backward flow disagree by more than this, in pixels;
-    /// infinite: backward flow is not computed.
+    /// Without initial flow, a pixel is missing if forward and backward flow disagree by more than this,
+    /// in pixels; infinite: backward flow is not computed.
     pub consistency_px: f32,
     /// Level at which the search of the backward flow ends.
     pub consistency_level: usize,
@@ -49,7 +49,7 @@ impl Default for FlowOptions {
             search_iterations: 12,
             propagation_rounds: 2,
             finest_search_level: 1,
-            initial_level: 2,
+            fill: true,
             window_radius_px: 4,
             refine_iterations: 2,
             noise_floor: 0.7,

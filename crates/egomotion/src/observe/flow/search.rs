@@ -6,6 +6,7 @@
 use super::sampling::interpolate;
 use super::{Displacement, FlowField, FlowOptions};
 use crate::geometry::{Grid, Image};
+use crate::observe::dispatch::vectorised;
 use crate::observe::pyramid::{Gradients, gradients};
 use rayon::prelude::*;
 
@@ -47,6 +48,7 @@ impl<'a> Pair<'a> {
     }
 
     /// The 8×8 pixels of the second image at (x, y), bilinear; clamped to the border's outer edge.
+    #[inline(always)]
     pub fn patch(&self, x: f32, y: f32) -> [[f32; PATCH]; PATCH] {
         let place = |c: f32, size: usize| {
             let c = (c + MARGIN as f32).clamp(0.0, (size - PATCH - 2) as f32);
@@ -97,6 +99,14 @@ impl Patches {
     /// Upper left pixel of the patch (column, row).
     pub fn corner(&self, column: usize, row: usize) -> (usize, usize) {
         ((column * self.stride).min(self.size.0 - PATCH), (row * self.stride).min(self.size.1 - PATCH))
+    }
+}
+
+impl Patches {
+    fn take(&mut self, templates: &[(usize, Template)], found: &[Match]) {
+        for ((i, _), found) in templates.iter().zip(found) {
+            self.matches[*i] = *found;
+        }
     }
 }
 
@@ -156,6 +166,7 @@ impl Template {
     }
 
     /// The cost of a displacement, and the step that lowers it.
+    #[inline(always)]
     fn evaluate(&self, pair: &Pair<'_>, u: f32, v: f32) -> (f32, [f32; 2]) {
         let moved = pair.patch(self.x + u, self.y + v);
         let [mut sum, mut squares, mut du, mut dv] = [[0.0_f32; PATCH]; 4];
@@ -177,6 +188,7 @@ impl Template {
     }
 
     /// Descend from (u, v); where it began if that leads nowhere.
+    #[inline(always)]
     fn descend(&self, pair: &Pair<'_>, u: f32, v: f32, iterations: usize) -> Match {
         let (cost, mut step) = self.evaluate(pair, u, v);
         let mut best = Match { u, v, cost };
@@ -200,15 +212,17 @@ impl Template {
     }
 }
 
-/// Search the displacement of every patch of a level.
+/// Search the displacement of the patches of a level.
 ///
 /// Each begins at the better of what the `coarser` level found and the `prediction` (a flow at full
 /// resolution, and this level), then takes up what its neighbours found if that fits clearly better.
-/// The coarsest level gets more rounds of that, since it has nothing else to begin with.
+/// The coarsest level gets more rounds of that, since it has nothing else to begin with. Patches whose
+/// upper left pixel is not `wanted` keep the prediction.
 pub(super) fn search(
     pair: &Pair<'_>,
     coarser: Option<&Displacement>,
     prediction: Option<(&FlowField, usize)>,
+    wanted: impl Fn(usize, usize) -> bool + Sync,
     is_coarsest: bool,
     options: &FlowOptions,
 ) -> Patches {
@@ -218,31 +232,79 @@ pub(super) fn search(
     let mut patches = Patches { columns: count(size.0), rows: count(size.1), stride, size, matches: vec![] };
     let places: Vec<(usize, usize)> =
         (0..patches.rows).flat_map(|row| (0..patches.columns).map(move |column| (column, row))).collect();
-    let templates: Vec<Template> =
-        places.par_iter().map(|&(column, row)| Template::new(pair, patches.corner(column, row))).collect();
-
-    patches.matches = templates
+    let templates: Vec<(usize, Template)> = places
         .par_iter()
-        .map(|template| {
-            let centre = (template.x + 0.5 * PATCH as f32, template.y + 0.5 * PATCH as f32);
-            let (u, v) = begin(pair, template, centre, coarser, prediction);
-            template.descend(pair, u, v, options.search_iterations)
+        .enumerate()
+        .filter_map(|(i, &(column, row))| {
+            let (x, y) = patches.corner(column, row);
+            wanted(x, y).then(|| (i, Template::new(pair, (x, y))))
         })
         .collect();
+
+    let still = |&(column, row): &(usize, usize)| {
+        let (x, y) = patches.corner(column, row);
+        let (u, v) = prediction.and_then(|p| predicted(p, centre(x as f32, y as f32))).unwrap_or_default();
+        Match { u, v, cost: 0.0 }
+    };
+    // Where all are wanted none keeps the prediction.
+    patches.matches = if templates.len() < places.len() {
+        places.par_iter().map(still).collect()
+    } else {
+        vec![Match { u: 0.0, v: 0.0, cost: 0.0 }; places.len()]
+    };
+    let iterations = options.search_iterations;
+    let found: Vec<Match> = templates
+        .par_iter()
+        .map(|(_, template)| {
+            let (u, v) = begin(pair, template, centre(template.x, template.y), coarser, prediction);
+            descend(pair, template, u, v, iterations)
+        })
+        .collect();
+    patches.take(&templates, &found);
     for _ in 0..options.propagation_rounds * if is_coarsest { 2 } else { 1 } {
         let before = &patches.matches;
-        let after = |(i, &(column, row)): (usize, &(usize, usize))| {
+        let columns = patches.columns;
+        let after = |(i, template): &(usize, Template)| {
+            let (column, row) = (i % columns, i / columns);
             let neighbours = [
                 (column > 0).then(|| i - 1),
-                (column + 1 < patches.columns).then_some(i + 1),
-                (row > 0).then(|| i - patches.columns),
-                (row + 1 < patches.rows).then_some(i + patches.columns),
+                (column + 1 < columns).then_some(i + 1),
+                (row > 0).then(|| i - columns),
+                (row + 1 < patches.rows).then_some(i + columns),
             ];
-            from_neighbours(pair, &templates[i], before, i, neighbours, options.search_iterations)
+            from_neighbours(pair, template, before, *i, neighbours, iterations)
         };
-        patches.matches = places.par_iter().enumerate().map(after).collect();
+        let found: Vec<Match> = templates.par_iter().map(after).collect();
+        patches.take(&templates, &found);
     }
     patches
+}
+
+/// The middle of the patch at (x, y).
+fn centre(x: f32, y: f32) -> (f32, f32) {
+    (x + 0.5 * PATCH as f32, y + 0.5 * PATCH as f32)
+}
+
+/// The prediction for a level at (x, y), in pixels of the level.
+fn predicted((flow, level): (&FlowField, usize), (x, y): (f32, f32)) -> Option<(f32, f32)> {
+    let scale = (1_usize << level) as f32;
+    let (column, row) = ((x * scale) as usize, (y * scale) as usize);
+    let (column, row) = (column.min(flow.u.width() - 1), row.min(flow.u.height() - 1));
+    Some((flow.u.get(column, row)? / scale, flow.v.get(column, row)? / scale))
+}
+
+vectorised! {
+/// [`Template::descend`].
+descend(pair: &Pair<'_>, template: &Template, u: f32, v: f32, iterations: usize) -> Match {
+    template.descend(pair, u, v, iterations)
+}
+}
+
+vectorised! {
+/// [`Template::evaluate`], the cost alone.
+cost(pair: &Pair<'_>, template: &Template, u: f32, v: f32) -> f32 {
+    template.evaluate(pair, u, v).0
+}
 }
 
 /// Where a patch begins: the better of the coarser level's displacement and the predicted one.
@@ -256,14 +318,8 @@ fn begin(
     let found = coarser.map_or((0.0, 0.0), |flow| {
         (2.0 * interpolate(&flow.u, 0.5 * x, 0.5 * y), 2.0 * interpolate(&flow.v, 0.5 * x, 0.5 * y))
     });
-    let predicted = prediction.and_then(|(flow, level)| {
-        let scale = (1_usize << level) as f32;
-        let (column, row) = ((x * scale) as usize, (y * scale) as usize);
-        let (column, row) = (column.min(flow.u.width() - 1), row.min(flow.u.height() - 1));
-        Some((flow.u.get(column, row)? / scale, flow.v.get(column, row)? / scale))
-    });
-    match predicted {
-        Some(p) if template.evaluate(pair, p.0, p.1).0 < template.evaluate(pair, found.0, found.1).0 => p,
+    match prediction.and_then(|p| predicted(p, (x, y))) {
+        Some(p) if cost(pair, template, p.0, p.1) < cost(pair, template, found.0, found.1) => p,
         _ => found,
     }
 }
@@ -283,13 +339,13 @@ fn from_neighbours(
         if (other.u - own.u).abs() + (other.v - own.v).abs() < 0.25 {
             continue;
         }
-        let (cost, _) = template.evaluate(pair, other.u, other.v);
+        let cost = cost(pair, template, other.u, other.v);
         if cost < best.cost {
             best = Match { cost, ..other };
         }
     }
     if best.cost < own.cost * CLEARLY_BETTER {
-        template.descend(pair, best.u, best.v, iterations)
+        descend(pair, template, best.u, best.v, iterations)
     } else {
         own
     }

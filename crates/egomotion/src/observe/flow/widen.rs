@@ -3,46 +3,39 @@
 //! A window of the same number of pixels at a coarser level covers more of the image: it sees texture
 //! farther away, and its noise is less.
 
-use super::Answer;
-use crate::geometry::Grid;
-use rayon::prelude::*;
+use crate::observe::planes::Planes;
 
-/// Take over from `wide`, which is in pixels of its `level`, what is unknown.
-pub(super) fn widen(flow: &mut Grid<Answer>, wide: &Grid<Answer>, level: usize) {
-    let width = flow.width();
+/// Answers (u, v, uu, uv, vv) at full resolution, or `None`, at pixel (x, y) from the `wide` ones of a
+/// `level`: bilinear displacement, with the covariance of the nearest pixel, for neighbours share most of
+/// their error, so that their mean has no less.
+#[inline]
+pub(super) fn widened<const N: usize>(
+    wide: &Planes<N>,
+    level: usize,
+    (x, y): (usize, usize),
+) -> Option<[f32; 5]> {
     let scale = (1_usize << level) as f32;
-    flow.values_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-        let unknown = |answer: &Answer| answer.cov[0] == f32::INFINITY;
-        for (x, answer) in row.iter_mut().enumerate().filter(|(_, answer)| unknown(answer)) {
-            let Answer { u, v, cov } = interpolate(wide, x as f32 / scale, y as f32 / scale);
-            if !u.is_nan() {
-                *answer = Answer { u: scale * u, v: scale * v, cov: cov.map(|c| scale * scale * c) };
-            }
-        }
-    });
-}
-
-/// Bilinear displacement at (x, y) of the plane, with the covariance of the nearest pixel: neighbours
-/// share most of their error, so that their mean has no less.
-fn interpolate(plane: &Grid<Answer>, x: f32, y: f32) -> Answer {
-    let (right, bottom) = (plane.width() - 1, plane.height() - 1);
-    let (x0, y0) = ((x as usize).min(right), (y as usize).min(bottom));
-    let (a, b) = (x - x0 as f32, y - y0 as f32);
-    let nearest = plane.at((x.round() as usize).min(right), (y.round() as usize).min(bottom));
-    if nearest.u.is_nan() {
-        return nearest;
+    let (right, bottom) = (wide.size().0 - 1, wide.size().1 - 1);
+    let (fx, fy) = (x as f32 / scale, y as f32 / scale);
+    let near = ((fx.round() as usize).min(right), (fy.round() as usize).min(bottom));
+    let (x0, y0) = ((fx as usize).min(right), (fy as usize).min(bottom));
+    let (x1, y1) = ((x0 + 1).min(right), (y0 + 1).min(bottom));
+    let (a, b) = (fx - x0 as f32, fy - y0 as f32);
+    let mean = |n: usize| {
+        let line = |y: usize| {
+            let left = wide.at(n, x0, y);
+            // A neighbour that is not needed may be missing.
+            if a > 0.0 { left + a * (wide.at(n, x1, y) - left) } else { left }
+        };
+        let above = line(y0);
+        if b > 0.0 { above + b * (line(y1) - above) } else { above }
+    };
+    let (u, v) = (mean(0), mean(1));
+    if u.is_nan() || v.is_nan() {
+        return None;
     }
-    let mut mean = Answer { u: 0.0, v: 0.0, ..nearest };
-    for (dx, dy, weight) in
-        [(0, 0, (1.0 - a) * (1.0 - b)), (1, 0, a * (1.0 - b)), (0, 1, (1.0 - a) * b), (1, 1, a * b)]
-    {
-        if weight > 0.0 {
-            let corner = plane.at((x0 + dx).min(right), (y0 + dy).min(bottom));
-            mean.u += weight * corner.u;
-            mean.v += weight * corner.v;
-        }
-    }
-    mean
+    let cov = [2, 3, 4].map(|n| scale * scale * wide.at(n, near.0, near.1));
+    Some([scale * u, scale * v, cov[0], cov[1], cov[2]])
 }
 
 #[cfg(test)]
@@ -50,15 +43,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_wider_window_answers_only_what_is_unknown() {
-        let answer = |u: f32| Answer { u, v: -u, cov: [0.01, 0.0, 0.01] };
-        let wide = Grid::from_fn(4, 4, |x, _| if x == 3 { Answer::REFUTED } else { answer(x as f32) });
-        let mut flow = Grid::filled(8, 8, Answer::UNKNOWN);
-        flow.set(2, 2, answer(9.0));
-        flow.set(3, 2, Answer::REFUTED);
-        widen(&mut flow, &wide, 1);
-        assert_eq!((flow.at(1, 2).u, flow.at(1, 2).v, flow.at(1, 2).cov[0]), (1.0, -1.0, 0.04));
-        assert_eq!((flow.at(2, 2).u, flow.at(4, 2).u), (9.0, 4.0));
-        assert!([3, 5, 6, 7].iter().all(|&x| flow.at(x, 2).u.is_nan()));
+    fn the_wider_window_answers_between_its_pixels_but_not_beside_its_holes() {
+        let mut wide = Planes::<5>::filled(4, 4, 0.01);
+        for strip in wide.strips(4) {
+            let [u, v, ..] = strip;
+            for i in 0..16 {
+                (u[i], v[i]) = if i % 4 == 3 { (f32::NAN, f32::NAN) } else { ((i % 4) as f32, -1.0) };
+            }
+        }
+        let [u, v, uu, ..] = widened(&wide, 1, (1, 2)).unwrap();
+        assert!((u, v) == (1.0, -2.0) && (uu - 0.04).abs() < 1e-6);
+        assert_eq!(widened(&wide, 1, (4, 2)).map(|a| a[0]), Some(4.0));
+        assert!([5, 6, 7].iter().all(|&x| widened(&wide, 1, (x, 2)).is_none()));
     }
 }

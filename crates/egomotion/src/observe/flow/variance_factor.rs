@@ -4,14 +4,11 @@
 //! correlate the noise of neighbours. The variance of Σ g r over a window is then not σ² Σ g² but
 //! σ² Σ g² × Σₗ ρ_r(l) ρ_g(l) over the lags l, with ρ the autocorrelations of residual and gradient.
 
-use super::Displacement;
-use crate::geometry::Image;
-use crate::observe::pyramid::Gradients;
-use crate::observe::spline;
+use super::compare::{Differences, Images};
 use rayon::prelude::*;
 
-/// Every so many rows and columns are sampled.
-const STEP: (usize, usize) = (2, 4);
+/// Every so many columns and rows are sampled.
+const STEP: (usize, usize) = (2, 16);
 /// Residuals larger than this many robust standard deviations are mismatches, not noise.
 const OUTLIER: f32 = 2.5;
 
@@ -23,15 +20,25 @@ struct Sample {
 }
 
 /// The factor Σₗ ρ_r(l) ρ_g(l), at least 1, of the separable autocorrelations' first lags.
-pub(super) fn variance_factor(from: &Image, to: &Image, slopes: &Gradients, flow: &Displacement) -> f32 {
-    let (width, height) = from.size();
-    let rows = (0..height.saturating_sub(1)).into_par_iter().step_by(STEP.1);
-    let mut samples: Vec<Sample> = rows
-        .flat_map_iter(|y| {
-            let columns = (0..width.saturating_sub(1)).step_by(STEP.0);
-            columns.filter_map(move |x| sample(from, to, slopes, flow, x, y))
-        })
-        .collect();
+///
+/// `start(y, u, v)` writes the displacement of row y.
+pub(super) fn variance_factor(
+    images: Images<'_>,
+    start: &(impl Fn(usize, &mut [f32], &mut [f32]) + Sync),
+) -> f32 {
+    let (width, height) = images.from.size();
+    let rows = (STEP.1 / 2..height.saturating_sub(1)).into_par_iter().step_by(STEP.1);
+    let samples = |y: usize| {
+        let [here, below] = [y, y + 1].map(|y| {
+            let mut row = Differences::new(width, 0);
+            start(y, &mut row.u[..width], &mut row.v[..width]);
+            row.compare(images, y, 0);
+            row
+        });
+        let columns = (0..width.saturating_sub(1)).step_by(STEP.0);
+        columns.filter_map(|x| sample(&here, &below, x)).collect::<Vec<_>>()
+    };
+    let mut samples: Vec<Sample> = rows.flat_map_iter(samples).collect();
     let Some(offset) = median(samples.iter().map(|s| s.residuals[0])) else { return 1.0 };
     let spread = median(samples.iter().map(|s| (s.residuals[0] - offset).abs())).unwrap_or(0.0);
     let largest = OUTLIER * 1.4826 * spread;
@@ -49,24 +56,14 @@ pub(super) fn variance_factor(from: &Image, to: &Image, slopes: &Gradients, flow
     if factor.is_finite() { factor } else { 1.0 }
 }
 
-/// The sample at (x, y); `None` where the displacement leaves the second image.
-fn sample(
-    from: &Image,
-    to: &Image,
-    slopes: &Gradients,
-    flow: &Displacement,
-    x: usize,
-    y: usize,
-) -> Option<Sample> {
-    let residual = |x: usize, y: usize| {
-        Some(spline::sample(to, x as f32 + flow.u.at(x, y), y as f32 + flow.v.at(x, y))? - from.at(x, y))
-    };
-    let product = |a: usize, b: usize| {
-        slopes.du.at(x, y) * slopes.du.at(a, b) + slopes.dv.at(x, y) * slopes.dv.at(a, b)
-    };
-    Some(Sample {
-        residuals: [residual(x, y)?, residual(x + 1, y)?, residual(x, y + 1)?],
-        gradients: [product(x, y), product(x + 1, y), product(x, y + 1)],
+/// The sample at column `x` of a row and the one below it; `None` where the second image has no counterpart.
+fn sample(here: &Differences, below: &Differences, x: usize) -> Option<Sample> {
+    let places = [(here, x), (here, x + 1), (below, x)];
+    let product =
+        |(row, k): (&Differences, usize)| here.slope_u[x] * row.slope_u[k] + here.slope_v[x] * row.slope_v[k];
+    places.iter().all(|(row, k)| row.known[*k] > 0.0).then(|| Sample {
+        residuals: places.map(|(row, k)| row.difference[k]),
+        gradients: places.map(product),
     })
 }
 
