@@ -7,6 +7,7 @@ mod evaluate;
 mod feed;
 mod info;
 mod judge;
+mod memory;
 mod report;
 mod results;
 mod run;
@@ -44,6 +45,7 @@ impl std::fmt::Display for Usage {
 impl std::error::Error for Usage {}
 
 fn main() -> ExitCode {
+    memory::keep();
     let cli = Cli::parse();
     let ending = match &cli.command {
         Command::Demo(args) => demo::demo(args),

@@ -21,11 +21,6 @@ impl<const N: usize> Planes<N> {
         &self.planes[n][v * self.width..(v + 1) * self.width]
     }
 
-    /// Row `v` of plane `n`, both inside.
-    pub fn row_mut(&mut self, n: usize, v: usize) -> &mut [f32] {
-        &mut self.planes[n][v * self.width..(v + 1) * self.width]
-    }
-
     /// Value of plane `n` at pixel (u, v), inside.
     pub fn at(&self, n: usize, u: usize, v: usize) -> f32 {
         self.planes[n][v * self.width + u]

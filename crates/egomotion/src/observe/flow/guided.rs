@@ -26,8 +26,8 @@ const CONTRADICTION: f32 = 6.0;
 const LARGEST_MEDIAN: f32 = 16.0;
 /// Side of the cells in which contradictions are gathered, in pixels of the search's finest level.
 const CELL: usize = 8;
-/// Contradicted pixels that make a cell worth a search.
-const FEW_CONTRADICTED: usize = 6;
+/// Contradicted pixels that make a cell worth a search: most of it.
+const FEW_CONTRADICTED: usize = CELL * CELL / 2;
 /// What the free search finds is taken only if its residual is lower by this factor: the prediction is
 /// the likelier.
 const CLEARLY_BETTER: f32 = 0.6;
@@ -341,20 +341,34 @@ fn correct(coarse: &Coarse, level: usize, y: usize, u: &mut [f32], v: &mut [f32]
 vectorised! {
 /// Add the values between two rows of a level, at the fraction `b` of the way.
 add_between(above: &[f32], below: &[f32], b: f32, level: usize, out: &mut [f32]) {
+    const TILE: usize = 64;
     let step = 1 << level;
-    let scale = step as f32;
     let right = above.len() - 1;
-    let below = &below[..=right];
-    for (x0, out) in out.chunks_mut(step).enumerate() {
-        let (x0, x1) = (x0.min(right), (x0 + 1).min(right));
-        let four = [above[x0], above[x1], below[x0], below[x1]];
-        let low = four[0].min(four[1]).min(four[2].min(four[3]));
-        let high = four[0].max(four[1]).max(four[2].max(four[3]));
-        let (left, next) = (four[0] + b * (four[2] - four[0]), four[1] + b * (four[3] - four[1]));
-        let is_one = high - low < SAME_MOTION_PX;
-        for (k, out) in out.iter_mut().enumerate() {
-            let between = left + k as f32 / scale * (next - left);
-            *out += scale * if is_one { between } else { four[0] };
+    for first in (0..=right).step_by(TILE) {
+        // The last pixel has itself for its neighbour.
+        let here = first..(first + TILE).min(right + 1);
+        let next = (first + 1).min(right)..(first + TILE + 1).min(right + 1);
+        let mut corners = [[0.0; TILE + 1]; 2];
+        for (corners, row) in corners.iter_mut().zip([above, below]) {
+            corners[..here.len()].copy_from_slice(&row[here.clone()]);
+            corners[here.len()] = row[next.end - 1];
+        }
+        let [above, below] = &corners;
+        let (mut values, mut growths) = ([0.0; TILE], [0.0; TILE]);
+        for i in 0..TILE {
+            let four = [above[i], above[i + 1], below[i], below[i + 1]];
+            let low = four[0].min(four[1]).min(four[2].min(four[3]));
+            let high = four[0].max(four[1]).max(four[2].max(four[3]));
+            let (left, next) = (four[0] + b * (four[2] - four[0]), four[1] + b * (four[3] - four[1]));
+            let is_one = high - low < SAME_MOTION_PX;
+            values[i] = step as f32 * if is_one { left } else { four[0] };
+            growths[i] = if is_one { next - left } else { 0.0 };
+        }
+        let out = out.chunks_mut(step).skip(first);
+        for (out, (value, growth)) in out.zip(values.iter().zip(&growths)) {
+            for (k, out) in out.iter_mut().enumerate() {
+                *out += value + k as f32 * growth;
+            }
         }
     }
 }
