@@ -67,7 +67,7 @@ fn refined(
     for _ in 1..options.refine_iterations {
         let before = smooth(&flow);
         let mut moved = Planes::<2>::filled(width, height, 0.0);
-        refine(images, options, f32::INFINITY, before.rows(), &mut moved, |_, solved, [u, v]| {
+        refine(images, options, f32::INFINITY, before.rows(), &mut moved, |_, _, solved, [u, v]| {
             u.copy_from_slice(&solved.moved_u[..width]);
             v.copy_from_slice(&solved.moved_v[..width]);
         });
@@ -76,7 +76,7 @@ fn refined(
     }
     let before = smooth(&flow);
     let mut answers = Planes::<5>::filled(width, height, f32::NAN);
-    refine(images, options, f32::INFINITY, before.rows(), &mut answers, |y, solved, out| {
+    refine(images, options, f32::INFINITY, before.rows(), &mut answers, |y, _, solved, out| {
         let rows = [&solved.u, &solved.v, &solved.uu, &solved.uv, &solved.vv];
         let [u, v, uu, uv, vv] = out;
         for (to, from) in [&mut *u, &mut *v, &mut *uu, &mut *uv, &mut *vv].into_iter().zip(rows) {

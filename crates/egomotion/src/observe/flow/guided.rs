@@ -7,11 +7,11 @@
 use super::claims::hide_claimed;
 use super::compare::Images;
 use super::free::coarse_to_fine;
+use super::measured::measured;
 use super::refine::refine;
 use super::search::PATCH;
 use super::solve::Solved;
-use super::widen::widened;
-use super::{FlowField, FlowOptions, FlowPair, GUESS_SIGMA_PX};
+use super::{FlowField, FlowOptions, FlowPair};
 use crate::geometry::Grid;
 use crate::observe::dispatch::vectorised;
 use crate::observe::planes::Planes;
@@ -19,7 +19,7 @@ use crate::observe::spline;
 use rayon::prelude::*;
 
 /// Standard deviation by which the prediction damps the steps from it, in pixels of the level.
-const PREDICTION_SIGMA_PX: f32 = 0.25;
+pub(super) const PREDICTION_SIGMA_PX: f32 = 0.25;
 /// A residual of so many times the image's median is no noise, in variances.
 const CONTRADICTION: f32 = 6.0;
 /// The median that is believed at most, in variances of the least noise: a prediction may be all wrong.
@@ -86,7 +86,7 @@ pub(super) fn flow(
 }
 
 /// The prediction of a row of a level, in its pixels; none where nothing is predicted.
-fn predicted_row(prediction: &FlowField, level: usize, y: usize, u: &mut [f32], v: &mut [f32]) {
+pub(super) fn predicted_row(prediction: &FlowField, level: usize, y: usize, u: &mut [f32], v: &mut [f32]) {
     let step = 1 << level;
     let y = (y * step).min(prediction.u.height() - 1);
     let scale = 1.0 / step as f32;
@@ -106,7 +106,7 @@ fn corrected(
 ) -> Coarse {
     let (width, height) = images.from.size();
     let mut out = Coarse::filled(width, height, f32::NAN);
-    refine(images, options, PREDICTION_SIGMA_PX, start, &mut out, |y, solved, out| {
+    refine(images, options, PREDICTION_SIGMA_PX, start, &mut out, |y, _, solved, out| {
         let [u, v, uu, uv, vv, du, dv, residual, before] = out;
         let Solved { moved_u, moved_v, .. } = solved;
         for (to, from) in [u, v, uu, uv, vv, residual, before].into_iter().zip([
@@ -271,63 +271,8 @@ fn typical(components: [&[f32]; 2], width: usize, column: usize) -> [f32; 2] {
     })
 }
 
-/// The step at full resolution, from the prediction and its correction.
-fn measured(
-    images: Images<'_>,
-    prediction: &FlowField,
-    coarse: &Coarse,
-    level: usize,
-    options: &FlowOptions,
-) -> FlowField {
-    let (width, height) = images.from.size();
-    let start = |y: usize, u: &mut [f32], v: &mut [f32]| {
-        predicted_row(prediction, 0, y, u, v);
-        correct(coarse, level, y, u, v);
-    };
-    let mut flow = Planes::<5>::filled(width, height, f32::NAN);
-    refine(images, options, PREDICTION_SIGMA_PX, start, &mut flow, |y, solved, out| {
-        let rows = [&solved.u, &solved.v, &solved.uu, &solved.uv, &solved.vv];
-        let [u, v, uu, uv, vv] = out;
-        for (to, from) in [&mut *u, &mut *v, &mut *uu, &mut *uv, &mut *vv].into_iter().zip(rows) {
-            to.copy_from_slice(&from[..width]);
-        }
-        let residual = coarse.row(RESIDUAL, (y >> level).min(coarse.size().1 - 1));
-        for x in 0..width {
-            // What is hidden at the coarse level is so here.
-            let is_seen = residual[(x >> level).min(residual.len() - 1)] < f32::INFINITY;
-            if is_seen && !u[x].is_nan() {
-                continue;
-            }
-            let lacks_texture = solved.uu[x] == f32::INFINITY;
-            let wider = (is_seen && lacks_texture).then(|| widened(coarse, level, (x, y))).flatten();
-            let moved = (is_seen && lacks_texture).then(|| (solved.moved_u[x], solved.moved_v[x]));
-            let guess = || guess(prediction, coarse, level, (x, y), moved).filter(|_| options.fill);
-            [u[x], v[x], uu[x], uv[x], vv[x]] = wider.or_else(guess).unwrap_or([f32::NAN; 5]);
-        }
-    });
-    FlowField::from_planes(flow)
-}
-
-/// The prediction at a pixel, corrected, or what became of it, with a covariance that says that it is a guess.
-fn guess(
-    prediction: &FlowField,
-    coarse: &Coarse,
-    level: usize,
-    (x, y): (usize, usize),
-    moved: Option<(f32, f32)>,
-) -> Option<[f32; 5]> {
-    let (u, v) = (prediction.u.get(x, y)?, prediction.v.get(x, y)?);
-    let near = ((x >> level).min(coarse.size().0 - 1), (y >> level).min(coarse.size().1 - 1));
-    let scale = (1 << level) as f32;
-    let correction = [CORRECTION, CORRECTION + 1].map(|n| scale * coarse.at(n, near.0, near.1));
-    let (u, v) = moved.unwrap_or((u + correction[0], v + correction[1]));
-    let least = GUESS_SIGMA_PX * GUESS_SIGMA_PX;
-    let (uu, uv, vv) = (prediction.cov_uu.at(x, y), prediction.cov_uv.at(x, y), prediction.cov_vv.at(x, y));
-    Some([u, v, uu + least, uv, vv + least])
-}
-
 /// Add the coarse level's corrections to a row of the prediction: bilinear within a motion, else the nearest.
-fn correct(coarse: &Coarse, level: usize, y: usize, u: &mut [f32], v: &mut [f32]) {
+pub(super) fn correct(coarse: &Coarse, level: usize, y: usize, u: &mut [f32], v: &mut [f32]) {
     let scale = 1.0 / (1_usize << level) as f32;
     let bottom = coarse.size().1 - 1;
     let fy = y as f32 * scale;

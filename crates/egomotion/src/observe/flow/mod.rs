@@ -15,6 +15,7 @@ mod consistency;
 mod densify;
 mod free;
 mod guided;
+mod measured;
 mod options;
 mod refine;
 mod rigid;

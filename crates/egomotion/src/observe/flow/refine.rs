@@ -20,7 +20,7 @@ const LANES: usize = 8;
 /// One Gauss–Newton step of every pixel's window (everything in pixels of the level).
 ///
 /// `start(y, u, v)` writes the displacement of row y at which the images are compared, each pixel at its
-/// own; `consume(y, solved, out)` gets what the step gives. Both may be called in any order, and `start`
+/// own; `consume(y, at, solved, out)` gets that row and what the step gives. Both may be called in any order, and `start`
 /// more than once. `prior_sigma_px`, if finite, damps `moved` as a prior of the start would.
 pub(super) fn refine<const N: usize>(
     images: Images<'_>,
@@ -28,7 +28,7 @@ pub(super) fn refine<const N: usize>(
     prior_sigma_px: f32,
     start: impl Fn(usize, &mut [f32], &mut [f32]) + Sync,
     out: &mut Planes<N>,
-    consume: impl Fn(usize, &Solved, [&mut [f32]; N]) + Sync,
+    consume: impl Fn(usize, &Differences, &Solved, [&mut [f32]; N]) + Sync,
 ) {
     let (width, height) = images.from.size();
     let weights = &options.window_weights()[..];
@@ -53,7 +53,12 @@ pub(super) fn refine<const N: usize>(
                     (above..=last).map(|k| (&ring[k % weights.len()], weights[k + radius - y])).collect();
                 solve_row(&rows, weights, &ring[y % weights.len()], settings, solved);
                 let first = (y - top) * width;
-                consume(y, solved, out.each_mut().map(|plane| &mut plane[first..first + width]));
+                consume(
+                    y,
+                    &ring[y % weights.len()],
+                    solved,
+                    out.each_mut().map(|plane| &mut plane[first..first + width]),
+                );
             }
         },
     );

@@ -8,7 +8,7 @@ use super::compare::{Differences, Images};
 use rayon::prelude::*;
 
 /// Every so many columns and rows are sampled.
-const STEP: (usize, usize) = (2, 16);
+const STEP: (usize, usize) = (2, 32);
 /// Residuals larger than this many robust standard deviations are mismatches, not noise.
 const OUTLIER: f32 = 2.5;
 
