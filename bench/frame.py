@@ -3,7 +3,7 @@
 usage: python bench/frame.py DATA [speed|growth|memory ...]   (needs numpy; DATA holds kitti_odometry)
 
 speed   five runs of KITTI odometry 06 by each way of observing: median of frame_ms, stages, errors
-growth  a rendered sequence in four sizes: frame_ms over pixels
+growth  a rendered sequence in four sizes, and with four numbers of levels: frame_ms
 memory  1000 frames (KITTI 06 forth and back): resident memory every 100 frames
 """
 import json
@@ -27,7 +27,8 @@ WAYS = {
 
 
 def run(source, out, *options):
-    subprocess.run([COMMAND, "run", source, "--out", out, "--quiet", *options], check=True)
+    command = [COMMAND, "run", source, "--out", out, "--quiet", *options]
+    subprocess.run(command, check=True, capture_output=True)
     with open(os.path.join(out, "summary.json")) as file:
         return json.load(file)
 
@@ -51,12 +52,18 @@ def growth(_, out):
     for width, height in ((320, 240), (640, 480), (960, 720), (1280, 960)):
         scene = os.path.join(out, f"{width}")
         simulate = [COMMAND, "simulate", "--sequence", "C", "--frames", "8", "--noise", "sensor", "--quiet"]
-        subprocess.run([*simulate, "--size", f"{width}x{height}", "--out", scene], check=True)
+        subprocess.run([*simulate, "--size", f"{width}x{height}", "--out", scene], check=True, capture_output=True)
         for name, options in list(WAYS.items())[:2]:
             summaries = [run(scene, os.path.join(out, "run"), *options) for _ in range(RUNS)]
             ms = np.median([s["frame_ms"] for s in summaries])
             print_row(f"{width}x{height} {name}", summaries)
             print(f"{'':22s} {1e6 * ms / (width * height):7.1f} ns a pixel", flush=True)
+    for levels in (32, 64, 128, 256):
+        settings = os.path.join(out, "levels.toml")
+        with open(settings, "w") as file:
+            file.write(f"[disparity]\nlevels = {levels}\n")
+        summaries = [run(scene, os.path.join(out, "run"), "--config", settings) for _ in range(RUNS)]
+        print_row(f"{width}x{height} {levels} levels", summaries)
 
 
 def memory(data, out):
@@ -76,7 +83,7 @@ def memory(data, out):
         file.writelines(f"{0.1 * k:.6e}\n" for k in range(1000))
     for name, options in list(WAYS.items())[:2]:
         command = [COMMAND, "run", long, "--out", os.path.join(out, "long-run"), "--quiet", *options]
-        process, samples = subprocess.Popen(command), []
+        process, samples = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL), []
         while process.poll() is None:
             with open(f"/proc/{process.pid}/statm") as file:
                 samples.append(int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6)

@@ -77,7 +77,8 @@ def errors(motions, truth):
 
 def ours(folder, observe):
     with tempfile.TemporaryDirectory() as out:
-        subprocess.run([COMMAND, "run", folder, "--out", out, "--quiet", "--observe", observe], check=True)
+        command = [COMMAND, "run", folder, "--out", out, "--quiet", "--observe", observe]
+        subprocess.run(command, check=True, capture_output=True)
         chain = poses(os.path.join(out, "trajectory_kitti.txt"))
     steps = [np.linalg.inv(b) @ a for a, b in zip(chain, chain[1:])]
     return [(step[:3, :3], step[:3, 3]) for step in steps]
