@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use criterion::Criterion;
 use egomotion::geometry::{Image, StereoRig, Twist};
-use egomotion::observe::flow::{Camera, FlowPair, rigid_flow};
+use egomotion::observe::flow::{Camera, FlowPair, FlowSpace, rigid_flow};
 use egomotion::observe::spline::coefficients;
 use egomotion::observe::{DisparityMatcher, DisparityOptions, FlowOptions, StereoPyramid};
 use nalgebra::Vector3;
@@ -41,15 +41,16 @@ fn flow(c: &mut Criterion) {
         });
     }
     let prediction = rigid_flow(&disparity, &rig, &phi, Camera::Left);
+    let mut space = FlowSpace::default();
     let pair = FlowPair { from: &before.left, to: &after.left, to_spline: Some(&after.left_spline) };
     let options = FlowOptions::default();
     c.bench_function("spline of the level where the search ends", |b| {
         b.iter(|| coefficients(&after.left.levels()[options.finest_search_level]));
     });
-    c.bench_function("flow, predicted", |b| b.iter(|| pair.flow(Some(&prediction), &options)));
-    c.bench_function("flow, free", |b| b.iter(|| pair.flow(None, &options)));
+    c.bench_function("flow, predicted", |b| b.iter(|| pair.flow(Some(&prediction), &options, &mut space)));
+    c.bench_function("flow, free", |b| b.iter(|| pair.flow(None, &options, &mut space)));
     let one_way = FlowOptions { consistency_px: f32::INFINITY, ..options };
-    c.bench_function("flow, free, one way", |b| b.iter(|| pair.flow(None, &one_way)));
+    c.bench_function("flow, free, one way", |b| b.iter(|| pair.flow(None, &one_way, &mut space)));
 }
 
 fn main() {

@@ -10,10 +10,22 @@ pub(crate) struct Planes<const N: usize> {
     planes: [Vec<f32>; N],
 }
 
+impl<const N: usize> Default for Planes<N> {
+    fn default() -> Self {
+        Self { width: 0, height: 0, planes: std::array::from_fn(|_| Vec::new()) }
+    }
+}
+
 impl<const N: usize> Planes<N> {
     /// Planes filled with one value.
     pub fn filled(width: usize, height: usize, value: f32) -> Self {
         Self { width, height, planes: std::array::from_fn(|_| vec![value; width * height]) }
+    }
+
+    /// Make them of this size; what they hold is then anything.
+    pub fn resize(&mut self, width: usize, height: usize) {
+        (self.width, self.height) = (width, height);
+        self.planes.iter_mut().for_each(|plane| plane.resize(width * height, f32::NAN));
     }
 
     /// Row `v` of plane `n`, both inside.

@@ -13,7 +13,7 @@ use crate::geometry::{Grid, StereoRig, Twist};
 use crate::motion::TimeToImpact;
 use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
 use crate::motion::impact::nearest;
-use crate::observe::flow::{Camera, FlowPair, rigid_flow};
+use crate::observe::flow::{Camera, FlowPair, FlowSpace, rigid_flow};
 use crate::observe::row_disagreement::row_disagreement;
 use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};
 use crate::observe::{DensePair, DisparityMap, FlowField, FlowOptions, StereoPyramid, StereoTrack};
@@ -73,7 +73,12 @@ impl FramePair<'_> {
     }
 
     /// Observe, constrain and estimate; then what the motion means for every pixel.
-    pub(super) fn motion(&self, velocity: Option<&Twist>, stages: &mut StageTimes) -> PairResult {
+    pub(super) fn motion(
+        &self,
+        velocity: Option<&Twist>,
+        space: &mut FlowSpace,
+        stages: &mut StageTimes,
+    ) -> PairResult {
         let prior = velocity.map(|v| v.scaled(self.dt_s()));
         let Tracked { tracks, rough, corners } = timed(&mut stages.tracks_ms, || self.tracks(prior.as_ref()));
         let result = match self.config.observe {
@@ -81,7 +86,7 @@ impl FramePair<'_> {
             Observe::Dense => {
                 let refined =
                     timed(&mut stages.tracks_ms, || rough.and_then(|rough| self.refined(&tracks, &rough)));
-                self.dense(&tracks, refined, stages)
+                self.dense(&tracks, refined, space, stages)
             }
         };
         PairResult { corners, ..result }
@@ -167,6 +172,7 @@ impl FramePair<'_> {
         &self,
         tracks: &[StereoTrack],
         rough: Result<Twist, Unsolvable>,
+        space: &mut FlowSpace,
         stages: &mut StageTimes,
     ) -> PairResult {
         let nothing = |why| PairResult {
@@ -184,8 +190,8 @@ impl FramePair<'_> {
         let both = differential && matches!(self.config.method, Method::Dv | Method::Joint | Method::Ml);
         let prediction = rough.as_ref().ok();
         let (flow, right) = timed(&mut stages.flow_ms, || {
-            let left = self.flow(Camera::Left, before, prediction);
-            let right = both.then(|| self.flow(Camera::Right, before, prediction));
+            let left = self.flow(Camera::Left, before, prediction, space);
+            let right = both.then(|| self.flow(Camera::Right, before, prediction, space));
             (left, right.flatten())
         });
         let Some(flow) = flow else {
@@ -234,7 +240,13 @@ impl FramePair<'_> {
 
     /// Flow of one camera; what is not measured but predicted counts for the left one only, for the right
     /// one's is read between its pixels.
-    fn flow(&self, camera: Camera, before: &DisparityMap, phi: Option<&Twist>) -> Option<FlowField> {
+    fn flow(
+        &self,
+        camera: Camera,
+        before: &DisparityMap,
+        phi: Option<&Twist>,
+        space: &mut FlowSpace,
+    ) -> Option<FlowField> {
         let (a, b) = (&self.before.images, &self.after.images);
         let (from, to, spline) = match camera {
             Camera::Left => (&a.left, &b.left, &b.left_spline),
@@ -243,7 +255,7 @@ impl FramePair<'_> {
         let initial = phi.map(|phi| rigid_flow(before, self.rig, phi, camera));
         let fill = self.config.flow.fill && camera == Camera::Left;
         let options = FlowOptions { fill, ..self.config.flow.clone() };
-        FlowPair { from, to, to_spline: Some(spline) }.flow(initial.as_ref(), &options).ok()
+        FlowPair { from, to, to_spline: Some(spline) }.flow(initial.as_ref(), &options, space).ok()
     }
 }
 

@@ -8,6 +8,7 @@ use super::maps::MotionMaps;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Field, Grid, Image, RigError, StereoRig, Twist};
 use crate::motion::TimeToImpact;
+use crate::observe::flow::FlowSpace;
 use crate::observe::{DisparityMap, DisparityMatcher, FlowField, StereoPyramid};
 
 /// A rectified pair of images of one time.
@@ -134,6 +135,7 @@ pub struct StereoMotion {
     reference: Option<Reference>,
     /// Velocity per second from the last answer.
     velocity: Option<Twist>,
+    flow_space: FlowSpace,
     /// The memory of a frame that is no longer needed.
     spare: Option<StereoPyramid>,
     /// Frames since the reference that gave no answer though their images were good.
@@ -163,6 +165,7 @@ impl StereoMotion {
             last_time_s: None,
             reference: None,
             velocity: None,
+            flow_space: FlowSpace::default(),
             spare: None,
             failures: 0,
         })
@@ -234,26 +237,30 @@ impl StereoMotion {
             disparity: disparity.flatten(),
             corners: Vec::new(),
         };
-        let Some(before) = self.reference.take() else {
+        let Some(mut before) = self.reference.take() else {
             let first = self.skip(here.time_s, Unanswered::First);
             self.reference = Some(here);
             return first;
         };
         let mask = self.mask.as_ref();
         let pair = FramePair { before: &before, after: &here, rig: &self.rig, config: &self.config, mask };
-        let result = pair.motion(self.velocity.as_ref(), &mut stages);
+        let result = pair.motion(self.velocity.as_ref(), &mut self.flow_space, &mut stages);
+        let dt_s = pair.dt_s();
+        // After an answer the earlier frame is not needed again.
+        let disparity =
+            if result.motion.is_ok() { before.disparity.take() } else { before.disparity.clone() };
         let answer = FrameMotion {
             frame: self.frames,
             reference: Some(before.frame),
             time_s: here.time_s,
-            dt_s: Some(pair.dt_s()),
+            dt_s: Some(dt_s),
             motion: result.motion,
             row_disagreement_px: result.row_disagreement_px,
             impact: result.impact,
             dense: result
                 .flow
                 .zip(result.maps)
-                .zip(before.disparity.clone())
+                .zip(disparity)
                 .map(|((flow, motion), disparity)| DenseResults { disparity, flow, motion }),
             stages,
         };

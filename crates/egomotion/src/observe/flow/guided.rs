@@ -11,7 +11,7 @@ use super::measured::measured;
 use super::refine::refine;
 use super::search::PATCH;
 use super::solve::Solved;
-use super::{FlowField, FlowOptions, FlowPair};
+use super::{FlowField, FlowOptions, FlowPair, FlowSpace};
 use crate::geometry::Grid;
 use crate::observe::dispatch::vectorised;
 use crate::observe::planes::Planes;
@@ -48,15 +48,17 @@ pub(super) fn flow(
     images: Images<'_>,
     prediction: &FlowField,
     options: &FlowOptions,
+    space: &mut FlowSpace,
 ) -> FlowField {
+    let FlowSpace { coarse, found, again } = space;
     let levels = pair.levels();
     let level = options.finest_search_level.min(levels.len() - 1);
     let (from, to) = levels[level];
     let coarse_images = Images { from, to: &spline::coefficients(to) };
     let predicted = |y: usize, u: &mut [f32], v: &mut [f32]| predicted_row(prediction, level, y, u, v);
 
-    let mut coarse = corrected(coarse_images, predicted, predicted, options);
-    let contradicted = contradicted_cells(&coarse, options.noise_floor);
+    corrected(coarse_images, predicted, predicted, options, coarse);
+    let contradicted = contradicted_cells(coarse, options.noise_floor);
     // A prediction that most of the image contradicts is none.
     if 2 * contradicted.values().iter().filter(|&&is| is).count() > contradicted.values().len() {
         return super::free::flow(pair, images, options);
@@ -65,24 +67,24 @@ pub(super) fn flow(
     let mut moving = Grid::filled(cells.width(), cells.height(), false);
     if cells.values().contains(&true) {
         let wanted = |at: usize, x: usize, y: usize| covers(&cells, at - level, (x, y));
-        let found = coarse_to_fine(&levels, Some(prediction), level, wanted, options);
+        let free = coarse_to_fine(&levels, Some(prediction), level, wanted, options);
         let start = |y: usize, u: &mut [f32], v: &mut [f32]| {
-            u.copy_from_slice(found.u.row(y));
-            v.copy_from_slice(found.v.row(y));
+            u.copy_from_slice(free.u.row(y));
+            v.copy_from_slice(free.v.row(y));
         };
-        let found = corrected(coarse_images, predicted, start, options);
-        moving = better_cells(&coarse, &found, &cells);
-        take_better(&mut coarse, &found, &cells, &moving);
+        corrected(coarse_images, predicted, start, options, found);
+        moving = better_cells(coarse, found, &cells);
+        take_better(coarse, found, &cells, &moving);
     }
-    spread(&mut coarse, &moving);
-    let again = |y: usize, u: &mut [f32], v: &mut [f32]| {
+    spread(coarse, &moving);
+    let start = |y: usize, u: &mut [f32], v: &mut [f32]| {
         predicted(y, u, v);
-        correct(&coarse, 0, y, u, v);
+        correct(coarse, 0, y, u, v);
     };
-    let mut coarse = corrected(coarse_images, predicted, again, options);
-    hide_claimed(&mut coarse);
-    spread(&mut coarse, &moving);
-    measured(images, prediction, &coarse, level, options)
+    corrected(coarse_images, predicted, start, options, again);
+    hide_claimed(again);
+    spread(again, &moving);
+    measured(images, prediction, again, level, options)
 }
 
 /// The prediction of a row of a level, in its pixels; none where nothing is predicted.
@@ -103,10 +105,11 @@ fn corrected(
     predicted: impl Fn(usize, &mut [f32], &mut [f32]) + Sync,
     start: impl Fn(usize, &mut [f32], &mut [f32]) + Sync,
     options: &FlowOptions,
-) -> Coarse {
+    out: &mut Coarse,
+) {
     let (width, height) = images.from.size();
-    let mut out = Coarse::filled(width, height, f32::NAN);
-    refine(images, options, PREDICTION_SIGMA_PX, start, &mut out, |y, _, solved, out| {
+    out.resize(width, height);
+    refine(images, options, PREDICTION_SIGMA_PX, start, out, |y, _, solved, out| {
         let [u, v, uu, uv, vv, du, dv, residual, before] = out;
         let Solved { moved_u, moved_v, .. } = solved;
         for (to, from) in [u, v, uu, uv, vv, residual, before].into_iter().zip([
@@ -126,7 +129,6 @@ fn corrected(
             dv[x] = moved_v[x] - dv[x];
         }
     });
-    out
 }
 
 /// Cells where grey levels contradict the prediction.

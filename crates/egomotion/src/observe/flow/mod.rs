@@ -141,7 +141,15 @@ pub fn dense_flow(
     initial: Option<&FlowField>,
     options: &FlowOptions,
 ) -> Result<FlowField, FlowError> {
-    FlowPair { from, to, to_spline: None }.flow(initial, options)
+    FlowPair { from, to, to_spline: None }.flow(initial, options, &mut FlowSpace::default())
+}
+
+/// Work space that flow keeps from one pair to the next; its content does not change the answer.
+#[derive(Debug, Clone, Default)]
+pub struct FlowSpace {
+    coarse: guided::Coarse,
+    found: guided::Coarse,
+    again: guided::Coarse,
 }
 
 /// Two images between which there is flow.
@@ -156,11 +164,16 @@ pub struct FlowPair<'a> {
 }
 
 impl FlowPair<'_> {
-    /// [`dense_flow`].
+    /// [`dense_flow`], in a work space at hand.
     ///
     /// # Errors
     /// As those of [`dense_flow`].
-    pub fn flow(&self, initial: Option<&FlowField>, options: &FlowOptions) -> Result<FlowField, FlowError> {
+    pub fn flow(
+        &self,
+        initial: Option<&FlowField>,
+        options: &FlowOptions,
+        space: &mut FlowSpace,
+    ) -> Result<FlowField, FlowError> {
         options.check()?;
         let size = self.from.size();
         let others = [self.to.size()].into_iter().chain(initial.map(FlowField::size));
@@ -185,7 +198,7 @@ impl FlowPair<'_> {
         };
         let images = compare::Images { from, to };
         Ok(match initial {
-            Some(prediction) => guided::flow(self, images, prediction, options),
+            Some(prediction) => guided::flow(self, images, prediction, options, space),
             None => free::flow(self, images, options),
         })
     }
