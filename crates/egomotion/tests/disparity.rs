@@ -115,7 +115,7 @@ fn no_disparity_is_locked_to_whole_pixels() {
     for bin in 0..8 {
         let phase = |d: f64| (d.rem_euclid(1.0) * 8.0) as usize == bin;
         let bias = median(errors.iter().filter(|e| phase(e.2)).map(|e| e.0).collect());
-        assert!(bias.abs() < 0.05, "bias {bias} px at a fraction of {}", bin as f64 / 8.0);
+        assert!(bias.abs() < 0.03, "bias {bias} px at a fraction of {}", bin as f64 / 8.0);
     }
 }
 
