@@ -2,8 +2,8 @@
 //!
 //! The difference of two disparity maps adds the errors of both. Here the same window is followed in
 //! time by either camera: the left one sees it move by u_L, the right one by u_R, and the disparity
-//! changes by exactly u_L − u_R: the Δv of (9) over a finite interval. How a window is biased by the shape of its surface is the same
-//! before and after, and cancels.
+//! changes by exactly u_L − u_R: the Δv of (9) over a finite interval. How a window is biased by the
+//! shape of its surface is the same before and after, and cancels.
 
 use super::patch::{Freedom, Patch, Settling};
 use super::stereo_pyramid::StereoPyramid;
@@ -31,7 +31,8 @@ pub struct Seen {
     pub flow: (f64, f64),
 }
 
-/// d′ − d of the patch at a pixel with its variance, in pixels; the first of the `expected` changes that leads to one.
+/// d′ − d of the patch at a pixel with its variance, in pixels: from the first of the `expected` changes
+/// that leads to one.
 ///
 /// `None` near the border, without texture, or where a window is not found again.
 pub fn disparity_change(
