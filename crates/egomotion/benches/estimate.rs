@@ -2,11 +2,11 @@
 //!
 //! Needs real images: KITTI odometry sequence 06 under `EGOMOTION_DATA` or `../shared/data`.
 
-use std::path::PathBuf;
+mod street;
 
 use criterion::Criterion;
 use egomotion::estimate::systematic::common_errors;
-use egomotion::geometry::{Image, StereoRig, Twist};
+use egomotion::geometry::Twist;
 use egomotion::motion::depth_velocity::{DisparityOffset, RigidPrediction};
 use egomotion::observe::tracks::{Hints, stereo_tracks};
 use egomotion::observe::{DensePair, DisparityMatcher, StereoPyramid, dense_flow};
@@ -14,24 +14,8 @@ use egomotion::pipeline::Config;
 use egomotion::pipeline::maps::motion_maps;
 use egomotion::pipeline::solve::{Observed, solve};
 
-fn image(side: usize, frame: usize) -> Option<Image> {
-    let data = std::env::var_os("EGOMOTION_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    let path = data.join(format!("kitti_odometry/sequences/06/image_{side}/{frame:06}.png"));
-    egomotion_io::image::read(&path).ok()
-}
-
 fn estimation(c: &mut Criterion) {
-    let images: Option<Vec<Image>> =
-        [(0, 4), (1, 4), (0, 5), (1, 5)].map(|(s, f)| image(s, f)).into_iter().collect();
-    let Some(images) = images else {
-        println!("SKIPPED: no KITTI odometry sequence 06");
-        return;
-    };
-    let (width, height) = images[0].size();
-    let rig = StereoRig::new(707.0912, (601.8873, 183.1104), 0.5372, (width, height)).unwrap();
+    let Some((images, rig)) = street::two_frames(4) else { return };
     let config = Config::default();
     let pyramids = |i: usize| StereoPyramid::new(&images[i], &images[i + 1], config.tracks.pyramid_levels);
     let (before, after) = (pyramids(0), pyramids(2));

@@ -2,10 +2,10 @@
 //!
 //! Needs real images: KITTI odometry sequence 06 under `EGOMOTION_DATA` or `../shared/data`.
 
-use std::path::PathBuf;
+mod street;
 
 use criterion::Criterion;
-use egomotion::geometry::{Image, StereoRig, Twist};
+use egomotion::geometry::Twist;
 use egomotion::observe::flow::{Camera, FlowPair, FlowSpace, rigid_flow};
 use egomotion::observe::spline::coefficients;
 use egomotion::observe::{DisparityMatcher, DisparityOptions, FlowOptions, StereoPyramid};
@@ -13,23 +13,8 @@ use nalgebra::Vector3;
 
 const LEVELS: usize = 6;
 
-fn image(side: usize, frame: usize) -> Option<Image> {
-    let data = std::env::var_os("EGOMOTION_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    let path = data.join(format!("kitti_odometry/sequences/06/image_{side}/{frame:06}.png"));
-    egomotion_io::image::read(&path).ok()
-}
-
 fn flow(c: &mut Criterion) {
-    let images: Option<Vec<Image>> =
-        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(s, f)| image(s, f)).into_iter().collect();
-    let Some(images) = images else {
-        println!("SKIPPED: no KITTI odometry sequence 06");
-        return;
-    };
-    let rig = StereoRig::new(707.0912, (601.8873, 183.1104), 0.5372, images[0].size()).unwrap();
+    let Some((images, rig)) = street::two_frames(0) else { return };
     let disparity =
         DisparityMatcher::new(DisparityOptions::default()).compute(&images[0], &images[1]).unwrap();
     // About what the car does here from frame to frame.

@@ -2,33 +2,16 @@
 //!
 //! Needs real images: KITTI odometry sequence 06 under `EGOMOTION_DATA` or `../shared/data`.
 
-use std::path::PathBuf;
+mod street;
 
 use criterion::Criterion;
 use egomotion::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood, robust_start};
-use egomotion::geometry::{Image, StereoRig};
 use egomotion::observe::StereoPyramid;
 use egomotion::observe::row_disagreement::row_disagreement;
 use egomotion::observe::tracks::{Expected, Hints, TrackOptions, follow, measured, stereo_corners};
 
-fn image(side: usize, frame: usize) -> Option<Image> {
-    let data = std::env::var_os("EGOMOTION_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    let path = data.join(format!("kitti_odometry/sequences/06/image_{side}/{frame:06}.png"));
-    egomotion_io::image::read(&path).ok()
-}
-
 fn tracking(c: &mut Criterion) {
-    let images: Option<Vec<Image>> =
-        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(s, f)| image(s, f)).into_iter().collect();
-    let Some(images) = images else {
-        println!("SKIPPED: no KITTI odometry sequence 06");
-        return;
-    };
-    let (width, height) = images[0].size();
-    let rig = StereoRig::new(707.0912, (601.8873, 183.1104), 0.5372, (width, height)).unwrap();
+    let Some((images, rig)) = street::two_frames(0) else { return };
     let likelihood = MaximumLikelihoodOptions::default();
     let levels = TrackOptions::default().pyramid_levels;
     let mut before = StereoPyramid::new(&images[0], &images[1], levels);

@@ -6,8 +6,10 @@ pub mod grid;
 pub mod perspective;
 pub mod rig;
 pub mod twist;
+mod upper_median;
 
 pub use gaussian::Gaussian;
 pub use grid::{Field, Grid, Image};
 pub use rig::{RigError, StereoRig};
 pub use twist::{RigidMotion, Twist};
+pub use upper_median::upper_median;

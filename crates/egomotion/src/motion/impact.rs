@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::Gaussian;
+use crate::geometry::{Gaussian, upper_median};
 
 /// 97.5 % quantile of the normal distribution: half the width of a 95 % interval, in σ.
 pub const Z95: f64 = 1.959_963_984_540_054;
@@ -104,10 +104,7 @@ pub fn nearest(blocks: &mut [Neighbourhood]) -> Option<TimeToImpact> {
             let count = block.crossing.len();
             count >= LEAST_POINTS && count as f64 >= LEAST_SHARE * block.seen as f64
         })
-        .map(|block| {
-            let middle = block.crossing.len() / 2;
-            *block.crossing.select_nth_unstable_by(middle, by_looming).1
-        })
+        .filter_map(|block| upper_median(&mut block.crossing, by_looming))
         .max_by(by_looming)
 }
 

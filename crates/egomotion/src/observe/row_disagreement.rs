@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::observation::StereoTrack;
 use super::patch::{Freedom, Patch, Settling};
 use super::stereo_pyramid::StereoPyramid;
-use crate::geometry::StereoRig;
+use crate::geometry::{StereoRig, upper_median};
 
 /// The image is looked at in so many regions each way: a calibration error varies over the image.
 const REGIONS: usize = 3;
@@ -44,8 +44,7 @@ pub fn row_disagreement(frame: &StereoPyramid, tracks: &[StereoTrack], rig: &Ste
     let medians: Vec<f64> = (0..REGIONS * REGIONS)
         .filter_map(|region| {
             let mut rows: Vec<f64> = found.iter().filter(|(r, _)| *r == region).map(|(_, dv)| *dv).collect();
-            let middle = rows.len() / 2;
-            (rows.len() >= LEAST_MATCHES).then(|| *rows.select_nth_unstable_by(middle, f64::total_cmp).1)
+            upper_median(&mut rows, f64::total_cmp).filter(|_| rows.len() >= LEAST_MATCHES)
         })
         .collect();
     let square: f64 = medians.iter().map(|m| m * m).sum();

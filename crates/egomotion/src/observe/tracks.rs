@@ -19,7 +19,7 @@ use super::observation::StereoTrack;
 use super::patch::{self, Localisation};
 use super::row_search::search_row;
 use super::stereo_pyramid::StereoPyramid;
-use crate::geometry::{Field, Gaussian, Grid, StereoRig, Twist};
+use crate::geometry::{Field, Gaussian, Grid, StereoRig, Twist, upper_median};
 
 /// How corners are found and followed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -198,11 +198,7 @@ impl GreyNoise {
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 1.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    upper_median(&mut values, f64::total_cmp).unwrap_or(1.0)
 }
 
 /// A window's own variance counts where it is more than chance makes of the pair's: a window has

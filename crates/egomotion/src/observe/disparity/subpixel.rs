@@ -14,7 +14,7 @@ use super::lanes::{Bytes, Kernel, widest};
 use super::lucas_kanade::{Differences, Fit, FitRow, row_length};
 use super::rows::{RowOffset, beside};
 use super::surface::{RADIUS, SurfaceMean};
-use crate::geometry::Image;
+use crate::geometry::{Image, upper_median};
 use crate::observe::spline;
 
 /// Standard deviation of the semi-global disparity, in pixels.
@@ -72,8 +72,7 @@ const SAMPLING: usize = 61;
 /// The median of the values that are numbers.
 fn median(values: impl Iterator<Item = f32>) -> Option<f32> {
     let mut sample: Vec<f32> = values.filter(|n| !n.is_nan()).collect();
-    let middle = sample.len() / 2;
-    (!sample.is_empty()).then(|| *sample.select_nth_unstable_by(middle, f32::total_cmp).1)
+    upper_median(&mut sample, f32::total_cmp)
 }
 
 /// The window's rows around row `v` of a plane with rows of `stride`, RADIUS.1 up and down; outside

@@ -12,7 +12,7 @@ use super::refine::refine;
 use super::search::PATCH;
 use super::solve::Solved;
 use super::{FlowField, FlowOptions, FlowPair, FlowSpace};
-use crate::geometry::Grid;
+use crate::geometry::{Grid, upper_median};
 use crate::observe::dispatch::vectorised;
 use crate::observe::planes::Planes;
 use crate::observe::spline;
@@ -139,11 +139,9 @@ fn contradicted_cells(coarse: &Coarse, noise: f32) -> Grid<bool> {
         .step_by(3)
         .flat_map(|y| coarse.row(RESIDUAL, y).iter().step_by(3).copied().filter(|r| r.is_finite()))
         .collect();
-    let middle = sample.len() / 2;
-    if sample.is_empty() {
+    let Some(median) = upper_median(&mut sample, f32::total_cmp) else {
         return Grid::filled(columns, rows, false);
-    }
-    let median = *sample.select_nth_unstable_by(middle, f32::total_cmp).1;
+    };
     let largest = CONTRADICTION * LARGEST_MEDIAN * noise * noise;
     let limit = largest.min(CONTRADICTION * median);
     let count = |column: usize, row: usize| {
@@ -268,8 +266,7 @@ fn typical(components: [&[f32]; 2], width: usize, column: usize) -> [f32; 2] {
     components.map(|values| {
         let mut cell: Vec<f32> =
             values.chunks(width).flat_map(|row| row[columns.clone()].iter().copied()).collect();
-        let middle = cell.len() / 2;
-        *cell.select_nth_unstable_by(middle, f32::total_cmp).1
+        upper_median(&mut cell, f32::total_cmp).unwrap_or(0.0)
     })
 }
 

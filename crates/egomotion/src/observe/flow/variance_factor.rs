@@ -5,6 +5,7 @@
 //! σ² Σ g² × Σₗ ρ_r(l) ρ_g(l) over the lags l, with ρ the autocorrelations of residual and gradient.
 
 use super::compare::{Differences, Images};
+use crate::geometry::upper_median;
 use rayon::prelude::*;
 
 /// Every so many columns and rows are sampled.
@@ -67,9 +68,6 @@ fn sample(here: &Differences, below: &Differences, x: usize) -> Option<Sample> {
     })
 }
 
-/// Upper median; `None` of nothing.
 fn median(values: impl Iterator<Item = f32>) -> Option<f32> {
-    let mut values: Vec<f32> = values.collect();
-    let middle = values.len() / 2;
-    (middle < values.len()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
+    upper_median(&mut values.collect::<Vec<_>>(), f32::total_cmp)
 }
