@@ -150,13 +150,11 @@ impl Verdicts {
 
     /// `seconds` is the true time to impact, negative where the point recedes.
     fn add_impact(&mut self, dense: &DenseResults, (u, v): (usize, usize), seconds: f64) {
-        let maps = &dense.motion;
-        let hi = f64::from(maps.impact_hi.at(u, v));
-        if let (Some(t), Some(lo)) = (maps.impact.get(u, v), maps.impact_lo.get(u, v)) {
-            let inside =
-                if seconds > 0.0 { f64::from(lo) <= seconds && seconds <= hi } else { hi.is_infinite() };
+        let Some(impact) = dense.motion.impact(u, v) else { return };
+        if let (Some(t), Some((lo, hi))) = (impact.seconds(), impact.interval95_s()) {
+            let inside = if seconds > 0.0 { lo <= seconds && seconds <= hi } else { hi.is_infinite() };
             self.impact_inside += usize::from(inside);
-            self.impact_errors_s.push((f64::from(t) - seconds).abs());
+            self.impact_errors_s.push((t - seconds).abs());
         }
     }
 }

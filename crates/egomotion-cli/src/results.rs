@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use egomotion::geometry::StereoRig;
+use egomotion::motion::TimeToImpact;
 use egomotion::pipeline::Config;
 use egomotion::pipeline::stereo::DenseResults;
 use egomotion_io::trajectory::{Pose, write_kitti, write_tum};
@@ -69,14 +70,15 @@ impl ResultFolder {
         let file =
             |folder: &str, extension: &str| self.path.join(folder).join(format!("{index:06}.{extension}"));
         let motion = &dense.motion;
+        let interval = |impact: &TimeToImpact| impact.interval95_s();
         for (folder, map) in [
             ("disparity", dense.disparity.shift.grid()),
             ("disparity_sigma", dense.disparity.sigma.grid()),
             ("depth_velocity", motion.depth_velocity.grid()),
             ("depth_velocity_sigma", motion.depth_velocity_sigma.grid()),
-            ("impact", motion.impact.grid()),
-            ("impact_lo", motion.impact_lo.grid()),
-            ("impact_hi", &motion.impact_hi),
+            ("impact", &motion.seconds(TimeToImpact::seconds)),
+            ("impact_lo", &motion.seconds(|impact| Some(interval(impact)?.0))),
+            ("impact_hi", &motion.seconds(|impact| Some(interval(impact)?.1))),
         ] {
             pfm::write(&file(folder, "pfm"), map)?;
         }

@@ -3,6 +3,7 @@
 use egomotion::estimate::median;
 use egomotion::geometry::{Grid, Image};
 use egomotion::metrics::quantile;
+use egomotion::motion::TimeToImpact;
 use egomotion::pipeline::stereo::DenseResults;
 
 use crate::chart::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Rgb, Spread, VIRIDIS};
@@ -60,7 +61,7 @@ impl FramePictures {
     /// The left image and the maps of a frame pair, reduced to 480 pixels in width.
     pub fn new(frame: usize, left: &Image, dense: &DenseResults) -> Self {
         let planes = [
-            dense.motion.impact.grid(),
+            &dense.motion.seconds(TimeToImpact::seconds),
             dense.disparity.shift.grid(),
             dense.motion.depth_velocity.grid(),
             dense.motion.depth_velocity_sigma.grid(),

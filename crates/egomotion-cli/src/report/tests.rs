@@ -82,9 +82,8 @@ fn dense(width: usize, height: usize, value: impl Fn(usize, usize) -> f32) -> De
         motion: MotionMaps {
             depth_velocity: field(),
             depth_velocity_sigma: field(),
-            impact: field(),
-            impact_lo: field(),
-            impact_hi: plane.clone(),
+            looming: field(),
+            looming_sigma: field(),
         },
     }
 }

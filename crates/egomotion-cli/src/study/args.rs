@@ -24,6 +24,8 @@ pub enum StudyCommand {
     Real(RealArgs),
     /// Sections 1, 3.1 and 4.3: depth against brightness, and instantaneous formulas on finite motions.
     Assumptions(LaboratoryArgs),
+    /// Whether the stated uncertainty is true: the whole image pipeline on random pairs of rendered frames.
+    Consistency(ConsistencyArgs),
     /// Every study, with one page that links them.
     All(LaboratoryArgs),
 }
@@ -145,6 +147,22 @@ pub struct RealArgs {
     pub laboratory: LaboratoryArgs,
 }
 
+/// Random pairs through the pipeline.
+#[derive(Debug, Clone, Args)]
+pub struct ConsistencyArgs {
+    /// The sequences, such as C,drive,lab-A [default: A, B, C, drive and lab-A … lab-M].
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = any_name)]
+    pub sequences: Option<Vec<String>>,
+    /// Size of the rendered images.
+    #[arg(long, value_name = "WxH", default_value = "320x240", value_parser = size)]
+    pub size: (usize, usize),
+    /// Tracks alone: φ, and no maps.
+    #[arg(long)]
+    pub sparse: bool,
+    #[command(flatten)]
+    pub laboratory: LaboratoryArgs,
+}
+
 /// Levels of disparity in a pixel; `None` where disparity is not rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Levels(pub Option<u32>);
@@ -167,6 +185,12 @@ fn number(text: &str) -> Result<f64, String> {
 fn lab_name(text: &str) -> Result<String, String> {
     let known = Sequence::lab_names().find(|name| name.eq_ignore_ascii_case(text));
     let all = || Sequence::lab_names().collect::<Vec<_>>().join(", ");
+    known.map(str::to_owned).ok_or_else(|| format!("must be of {}", all()))
+}
+
+fn any_name(text: &str) -> Result<String, String> {
+    let known = Sequence::names().find(|name| name.eq_ignore_ascii_case(text));
+    let all = || Sequence::names().collect::<Vec<_>>().join(", ");
     known.map(str::to_owned).ok_or_else(|| format!("must be of {}", all()))
 }
 

@@ -14,7 +14,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Result;
+use egomotion::pipeline::Observe;
 use egomotion::study::assumptions::Assumptions;
+use egomotion::study::consistency::Consistency;
 use egomotion::study::draw::Measuring;
 use egomotion::study::real::LabStudy;
 use egomotion::study::sensitivity::{OneSetting, Sensitivity};
@@ -24,7 +26,7 @@ use crate::run::set_threads;
 use crate::{Ending, terminal};
 
 pub use args::StudyCommand;
-use args::{LaboratoryArgs, TableArgs};
+use args::{ConsistencyArgs, LaboratoryArgs, TableArgs};
 use laboratory::{Laboratory, Options};
 
 /// Run what was asked for.
@@ -37,6 +39,7 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
         StudyCommand::Uncertainty(args) => alone(args, &uncertainty(args)),
         StudyCommand::Real(args) => real::run(args),
         StudyCommand::Assumptions(args) => alone(args, &Assumptions { seed: args.seed }),
+        StudyCommand::Consistency(args) => alone(&args.laboratory, &consistency(args)),
         StudyCommand::All(args) => {
             let mut laboratory = open(args, None, Some("The paper's studies, repeated"))?;
             // Its draws are of another kind and number.
@@ -74,6 +77,18 @@ fn sensitivity(args: &LaboratoryArgs, sequences: Vec<String>) -> Sensitivity {
 fn uncertainty(args: &LaboratoryArgs) -> Uncertainty {
     let own = Uncertainty::default();
     Uncertainty { draws: args.draws.unwrap_or(own.draws), seed: args.seed, ..own }
+}
+
+fn consistency(args: &ConsistencyArgs) -> Consistency {
+    let own = Consistency::default();
+    Consistency {
+        sequences: args.sequences.clone().unwrap_or(own.sequences),
+        width_px: args.size.0,
+        height_px: args.size.1,
+        observe: if args.sparse { Observe::Sparse } else { Observe::Dense },
+        pairs: args.laboratory.draws.unwrap_or(own.pairs),
+        seed: args.laboratory.seed,
+    }
 }
 
 /// Draws of a single setting where none are asked for.

@@ -55,8 +55,8 @@ pub(super) struct MapRow {
     crosses: Vec<bool>,
 }
 
-/// The values of a row that leave it: VZ, its σ, time to impact, and the ends of its interval.
-pub(super) type Output<'a> = [&'a mut [f32]; 5];
+/// The values of a row that leave it: VZ, its σ, looming, and its σ.
+pub(super) type Output<'a> = [&'a mut [f32]; 4];
 
 impl MapRow {
     /// A row of so many pixels.
@@ -88,7 +88,7 @@ impl MapRow {
                 unless_moving(rigid, rays, &self.disparities, &self.sigma, &mut self.velocity);
             }
         }
-        impacts(&self.velocity, dt_s, &mut self.looming, out);
+        loomings(&self.velocity, dt_s, &mut self.looming, out);
         match rigid {
             Some(rigid) => {
                 let when = (&config.window, dt_s);
@@ -208,29 +208,24 @@ unless_moving(
 }
 
 vectorised! {
-/// VZ, its σ and time to impact with its interval; looming with its variance.
-impacts(velocity: &[Vec<f64>; 5], dt_s: f64, looming: &mut [Vec<f64>; 2], out: Output<'_>) {
+/// VZ and looming with their σ.
+loomings(velocity: &[Vec<f64>; 5], dt_s: f64, looming: &mut [Vec<f64>; 2], out: Output<'_>) {
     let [a, b, c, d, e] = velocity.each_ref().map(Vec::as_slice);
     let n = a.len();
     let (a, b, c, d, e) = (&a[..n], &b[..n], &c[..n], &d[..n], &e[..n]);
     let [rate, rate_variance] = looming.each_mut().map(|plane| &mut plane[..n]);
-    let [vz, sigma, seconds, lo, hi] = out;
-    let (vz, sigma, seconds) = (&mut vz[..n], &mut sigma[..n], &mut seconds[..n]);
-    let (lo, hi) = (&mut lo[..n], &mut hi[..n]);
+    let [vz, sigma, out_rate, out_sigma] = out;
+    let (vz, sigma) = (&mut vz[..n], &mut sigma[..n]);
+    let (out_rate, out_sigma) = (&mut out_rate[..n], &mut out_sigma[..n]);
     for u in 0..n {
-        let velocity = whole([a[u], b[u], c[u], d[u], e[u]]);
-        let looming = velocity.looming_in_front(dt_s);
-        let impact = TimeToImpact { looming };
+        let looming = whole([a[u], b[u], c[u], d[u], e[u]]).looming_in_front(dt_s);
         let ahead = a[u] + b[u] > 0.0;
-        let (fast, slow) = impact.rates95();
-        let approaches = ahead & (looming.value() > 0.0);
         vz[u] = b[u] as f32;
         sigma[u] = d[u].sqrt() as f32;
-        seconds[u] = if approaches { looming.value().recip() as f32 } else { f32::NAN };
-        lo[u] = if approaches { fast.recip() as f32 } else { f32::NAN };
-        hi[u] = if approaches { slow.max(0.0).recip() as f32 } else { f32::NAN };
         rate[u] = if ahead { looming.value() } else { f64::NAN };
         rate_variance[u] = looming.variance();
+        out_rate[u] = rate[u] as f32;
+        out_sigma[u] = looming.variance().sqrt() as f32;
     }
 }
 }

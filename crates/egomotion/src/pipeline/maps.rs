@@ -7,7 +7,7 @@ use super::config::{Config, Method};
 use super::map_row::{MapRow, Scene};
 use super::moving::Moving;
 use crate::estimate::Blocks;
-use crate::geometry::{Field, Grid, StereoRig};
+use crate::geometry::{Field, Gaussian, Grid, StereoRig};
 use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
 use crate::motion::impact::{Neighbourhood, TimeToImpact};
 use crate::observe::{DensePair, StereoPyramid, StereoTrack};
@@ -19,12 +19,26 @@ pub struct MotionMaps {
     pub depth_velocity: Field,
     /// Standard deviation of VZ.
     pub depth_velocity_sigma: Field,
-    /// Time to impact in seconds, where the point approaches.
-    pub impact: Field,
-    /// Near end of its 95 % interval.
-    pub impact_lo: Field,
-    /// Far end, which may be infinite.
-    pub impact_hi: Grid<f32>,
+    /// Looming in 1/s, positive where the point approaches: time to impact is its inverse.
+    pub looming: Field,
+    /// Standard deviation of looming.
+    pub looming_sigma: Field,
+}
+
+impl MotionMaps {
+    /// Time to impact of a pixel; `None` without an answer.
+    pub fn impact(&self, u: usize, v: usize) -> Option<TimeToImpact> {
+        let (looming, sigma) = (self.looming.get(u, v)?, self.looming_sigma.get(u, v)?);
+        Some(TimeToImpact { looming: Gaussian::scalar(looming.into(), f64::from(sigma).powi(2)) })
+    }
+
+    /// A quantity of every pixel that approaches, in seconds; NaN elsewhere.
+    pub fn seconds(&self, quantity: impl Fn(&TimeToImpact) -> Option<f64>) -> Grid<f32> {
+        let approaches = |impact: &TimeToImpact| impact.looming.value() > 0.0;
+        let value = |u, v| quantity(&self.impact(u, v).filter(approaches)?);
+        let (width, height) = self.looming.size();
+        Grid::from_fn(width, height, |u, v| value(u, v).map_or(f32::NAN, |seconds| seconds as f32))
+    }
 }
 
 /// Side of the blocks in which dense points make an obstacle, in pixels.
@@ -49,16 +63,16 @@ pub fn motion_maps(
     let own = matches!(config.method, Method::Dcce | Method::Dv);
     let moving = rigid.filter(|_| !own).map(|rigid| Moving::find(pair, images, rigid));
     let scene = Scene { pair, rigid, moving: moving.as_ref(), config, dt_s };
-    let mut planes: [Grid<f32>; 5] = std::array::from_fn(|_| Grid::filled(width, height, 0.0));
-    let [vz, sigma, impact, lo, hi] =
+    let mut planes: [Grid<f32>; 4] = std::array::from_fn(|_| Grid::filled(width, height, 0.0));
+    let [vz, sigma, looming, looming_sigma] =
         planes.each_mut().map(|plane| plane.values_mut().par_chunks_mut(width.max(1)));
-    let rows: Vec<Vec<(usize, Neighbourhood)>> = (vz, sigma, impact, lo, hi)
+    let rows: Vec<Vec<(usize, Neighbourhood)>> = (vz, sigma, looming, looming_sigma)
         .into_par_iter()
         .enumerate()
         .map_init(
             || MapRow::new(width),
-            |row, (v, (vz, sigma, impact, lo, hi))| {
-                row.fill(&scene, v, [vz, sigma, impact, lo, hi]);
+            |row, (v, (vz, sigma, looming, looming_sigma))| {
+                row.fill(&scene, v, [vz, sigma, looming, looming_sigma]);
                 neighbourhoods(row, pair.rig, &blocks, v)
             },
         )
@@ -68,11 +82,11 @@ pub fn motion_maps(
         seen[block].seen += part.seen;
         seen[block].crossing.extend(part.crossing);
     }
-    let [vz, sigma, impact, lo, impact_hi] = planes;
+    let [vz, sigma, looming, looming_sigma] = planes;
     let fields = |a, b| rayon::join(|| Field::from_grid(a), || Field::from_grid(b));
-    let ((depth_velocity, depth_velocity_sigma), (impact, impact_lo)) =
-        rayon::join(|| fields(vz, sigma), || fields(impact, lo));
-    let maps = MotionMaps { depth_velocity, depth_velocity_sigma, impact, impact_lo, impact_hi };
+    let ((depth_velocity, depth_velocity_sigma), (looming, looming_sigma)) =
+        rayon::join(|| fields(vz, sigma), || fields(looming, looming_sigma));
+    let maps = MotionMaps { depth_velocity, depth_velocity_sigma, looming, looming_sigma };
     (maps, seen)
 }
 

@@ -4,6 +4,7 @@
 //! tables and figures as plain values ([`Publication`]). Files, pages and progress are the command's.
 
 pub mod assumptions;
+pub mod consistency;
 pub mod contender;
 pub mod draw;
 pub mod figure;
