@@ -35,8 +35,8 @@ pub struct MaximumLikelihoodOptions {
     pub start_observations: usize,
     /// Seed of the robust start.
     pub seed: u64,
-    /// Standard deviation of the bias that all matches of a frame share, in pixels; see [`super::systematic`].
-    pub localisation_bias_px: f64,
+    /// Standard deviation of the phase error's amplitude, in pixels; see [`super::systematic`].
+    pub phase_error_px: f64,
 }
 
 impl Default for MaximumLikelihoodOptions {
@@ -47,7 +47,7 @@ impl Default for MaximumLikelihoodOptions {
             confidence: 0.999,
             start_observations: 600,
             seed: 1,
-            localisation_bias_px: 0.0015,
+            phase_error_px: 0.003,
         }
     }
 }

@@ -31,6 +31,9 @@ pub struct Linearised {
     pub(super) by_motion: SMatrix<f64, 3, 6>,
     /// ∂e per pixel by which every disparity is too large, before and after.
     pub(super) by_offset: Vector3<f64>,
+    /// ∂e per pixel of the amplitude by which x, y, and disparity (of flows the right camera's x) err with
+    /// their sub-pixel phase, one a column; see [`super::systematic`].
+    pub(super) by_phase: Matrix3<f64>,
 }
 
 /// S⁻¹ by S = L D Lᵀ; `None` unless S is positive definite, which rounding or a careless caller may break.
@@ -63,8 +66,6 @@ pub trait Measurement: Copy + Send + Sync {
     fn structure(&self) -> Vector3<f64>;
     /// Linearise about a motion and a structure, and improve the structure; `None` behind the camera.
     fn linearise(&self, structure: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised>;
-    /// How far the point moves in the left image, in pixels.
-    fn displacement_px(&self) -> f64;
     /// The sums of consecutive observations, one for each run of them that lies in one block.
     fn sums(
         observations: &[Self],
@@ -75,6 +76,16 @@ pub trait Measurement: Copy + Send + Sync {
     /// ∂δ/∂φ of the small motion δ by which observations of this kind are linearised: it is the same for
     /// all of them, so it is applied to sums.
     fn by_phi(at: &At<'_>) -> Matrix6<f64>;
+}
+
+/// The wave of period 1 and amplitude 1 that sin 2πu is, by two parabolas.
+///
+/// So do matches err with the fraction of a pixel by which they are displaced: not at whole pixels, where both
+/// images are sampled alike, nor half-way, where either side pulls as much.
+#[inline(always)]
+pub(super) fn wave(u: f64) -> f64 {
+    let phase = u - u.round();
+    8.0 * phase * (1.0 - 2.0 * phase.abs())
 }
 
 /// How far a structure may move from where it was measured, in standard deviations.
@@ -128,7 +139,13 @@ impl Measurement for StereoTrack {
         }
         let by_motion = at.rig.velocity_jacobian(&predicted);
         let by_offset = Vector3::z() - by_structure.column(2);
-        Some(Linearised { misclosure, inverse_cov, by_motion, by_offset })
+        let (before, after) = (&self.before.mean, &self.after.mean);
+        let by_phase = Matrix3::from_data(ArrayStorage([
+            [wave(after.x - before.x), 0.0, 0.0],
+            [0.0, wave(after.y - before.y), 0.0],
+            (Vector3::z() * wave(after.z) - by_structure.column(2) * wave(before.z)).into(),
+        ]));
+        Some(Linearised { misclosure, inverse_cov, by_motion, by_offset, by_phase })
     }
 
     /// Motions are composed: exp(φ + dφ) = exp(δ) exp(φ).
@@ -143,10 +160,6 @@ impl Measurement for StereoTrack {
         weighing: &Weighing<'_>,
     ) -> Vec<(usize, Step)> {
         step::of_tracks(observations, structures, at, weighing)
-    }
-
-    fn displacement_px(&self) -> f64 {
-        (self.after.mean - self.before.mean).xy().norm()
     }
 }
 
@@ -194,7 +207,9 @@ impl Measurement for StereoFlow {
             s.z = improved;
         }
         let by_motion = at.rig.velocity_jacobian(&Vector3::new(x, y, d));
-        Some(Linearised { misclosure, inverse_cov, by_motion, by_offset: -by_d })
+        let (x, y, right) = (wave(measured[1]), wave(measured[2]), wave(measured[3]));
+        let by_phase = Matrix3::from_data(ArrayStorage([[x, 0.0, x], [0.0, y, 0.0], [0.0, 0.0, -right]]));
+        Some(Linearised { misclosure, inverse_cov, by_motion, by_offset: -by_d, by_phase })
     }
 
     /// Velocities add up.
@@ -209,9 +224,5 @@ impl Measurement for StereoFlow {
         weighing: &Weighing<'_>,
     ) -> Vec<(usize, Step)> {
         step::of_flows(observations, structures, at, weighing)
-    }
-
-    fn displacement_px(&self) -> f64 {
-        self.measured.mean.fixed_rows::<2>(1).norm()
     }
 }

@@ -17,7 +17,7 @@ pub struct Step {
     pub(super) score: BlockScore<6>,
     /// By how much the score's true derivative is less than the information, because weights change as well.
     reweighting: Matrix6<f64>,
-    /// Σ w Gᵀ S⁻¹ δe for errors that all observations share: a localisation bias in x, y and d, an offset of disparity.
+    /// Σ w Gᵀ S⁻¹ δe for errors that all observations share: amplitudes of the phase error of x, y and d, an offset of disparity.
     pub(super) shared: SMatrix<f64, 6, 4>,
     /// Σ w.
     weights: f64,
@@ -62,7 +62,7 @@ impl Step {
     }
 
     #[inline(always)]
-    fn add(&mut self, l: &Linearised, displacement_px: f64, weighing: &Weighing<'_>) {
+    fn add(&mut self, l: &Linearised, weighing: &Weighing<'_>) {
         let (kernel, scale2) = (weighing.kernel, weighing.scale2);
         let q = l.misclosure.dot(&product(&l.inverse_cov, &l.misclosure));
         let weight = kernel.weight(q / scale2, 3.0);
@@ -72,14 +72,8 @@ impl Step {
         accumulate(&mut self.score.score, &weighted, &l.misclosure);
         let change = kernel.curvature(q / scale2, 3.0) / (scale2 * weight * weight);
         accumulate(&mut self.reweighting, &(score * change), &score.transpose());
-        // Without motion both images are sampled alike, and share their errors.
-        let share = displacement_px.min(1.0);
-        let errors = SMatrix::<f64, 3, 4>::from_data(ArrayStorage([
-            [share, 0.0, 0.0],
-            [0.0, share, 0.0],
-            [0.0, 0.0, share],
-            l.by_offset.into(),
-        ]));
+        let [x, y, d] = l.by_phase.data.0;
+        let errors = SMatrix::<f64, 3, 4>::from_data(ArrayStorage([x, y, d, l.by_offset.into()]));
         accumulate(&mut self.shared, &weighted, &errors);
         self.weights += weight;
         self.weighted_square += weight * q;
@@ -172,7 +166,7 @@ fn strip<M: Measurement>(
             run = (block, Step::default());
         }
         if let Some(l) = observation.linearise(structure, at) {
-            run.1.add(&l, observation.displacement_px(), weighing);
+            run.1.add(&l, weighing);
         }
     }
     runs.push(run);

@@ -102,7 +102,7 @@ impl Default for Config {
             estimator: EstimatorKind::Irls,
             observe: Observe::Dense,
             seed: 1,
-            block_px: 64.0,
+            block_px: 40.0,
             sample_step_px: 3,
             window: VehicleWindow::default(),
             tracks: TrackOptions::default(),
@@ -192,8 +192,8 @@ impl Config {
             ),
             (ml.start_observations >= 4, "maximum_likelihood.start_observations must be at least 4"),
             (
-                ml.localisation_bias_px.is_finite() && ml.localisation_bias_px >= 0.0,
-                "maximum_likelihood.localisation_bias_px must not be negative",
+                ml.phase_error_px.is_finite() && ml.phase_error_px >= 0.0,
+                "maximum_likelihood.phase_error_px must not be negative",
             ),
             (
                 self.window.left_m < self.window.right_m && self.window.top_m < self.window.bottom_m,

@@ -124,7 +124,7 @@ impl<'a> Solver<'a> {
         if motion.theta.cov.iter().all(|v| v.is_finite())
             && let Some(common) = found.common
         {
-            motion.theta.cov += common.localisation_covariance(options.localisation_bias_px);
+            motion.theta.cov += common.phase_covariance(options.phase_error_px);
         }
         Ok(motion)
     }

@@ -76,7 +76,7 @@ impl Contender {
             // The noise of the synthetic world is Gaussian, so its likelihood is.
             maximum_likelihood: MaximumLikelihoodOptions {
                 kernel: StudentT { nu: f64::INFINITY, ..StudentT::default() },
-                localisation_bias_px: 0.0,
+                phase_error_px: 0.0,
                 ..MaximumLikelihoodOptions::default()
             },
             ..Config::default()

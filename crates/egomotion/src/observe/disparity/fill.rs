@@ -1,19 +1,23 @@
 //! Holes filled from either side along the row, with a standard deviation that says so.
 //!
 //! What one camera alone sees lies behind what hides it: a gap between two surfaces belongs to the
-//! farther one. Along a slanted surface the gap is bridged. The standard deviations are what such
-//! guesses err by (the middle 68 %) on Middlebury and KITTI pairs; their tails are long.
+//! farther one. Along a slanted surface the gap is bridged. A guess that is wrong is so by far, so
+//! the standard deviations are not what most guesses err by, but half of what 95 % of them do on
+//! rendered and KITTI pairs: an interval has to hold the truth.
 
 /// Slope of disparity along a row, px per px, up to which the ends of a gap are one surface.
 const ONE_SURFACE_SLOPE: f32 = 0.2;
 /// Difference of the ends of a gap that is one surface whatever its width, in pixels.
 const ONE_SURFACE_STEP: f32 = 1.0;
-/// Standard deviation of a bridge, in pixels, and what it grows by with the difference of its ends.
-const BRIDGE_SIGMA: f32 = 1.0;
-const BRIDGE_SIGMA_PER_STEP: f32 = 0.4;
+/// Standard deviation of a bridge, in pixels.
+const BRIDGE_SIGMA: f32 = 2.0;
 /// Standard deviation of the farther end, in pixels.
 const FARTHER_SIGMA: f32 = 2.0;
-/// Growth of the standard deviation with the distance from the end, where a gap has one end only.
+/// Growth of the standard deviation with the difference of the ends: the gap may belong to the nearer
+/// one, and the 95 % interval holds both.
+const SIGMA_PER_STEP: f32 = 0.6;
+/// Standard deviation where a gap has one end only, in pixels, and its growth with the distance from it.
+const BEYOND_SIGMA: f32 = 3.0;
 const SIGMA_PER_PIXEL: f32 = 0.03;
 
 /// Pixels that tell of the surface at an end of a gap.
@@ -74,16 +78,16 @@ fn between(a: (f32, f32), b: (f32, f32), t: f32, length: usize) -> (f32, f32) {
     let step = (b.0 - a.0).abs();
     if step <= ONE_SURFACE_STEP.max(ONE_SURFACE_SLOPE * (length + 1) as f32) {
         let ends = a.1.max(b.1);
-        (a.0 + t * (b.0 - a.0), ends.hypot(BRIDGE_SIGMA.hypot(BRIDGE_SIGMA_PER_STEP * step)))
+        (a.0 + t * (b.0 - a.0), ends.hypot(BRIDGE_SIGMA.hypot(SIGMA_PER_STEP * step)))
     } else {
         let farther = if a.0 < b.0 { a } else { b };
-        (farther.0, farther.1.hypot(FARTHER_SIGMA))
+        (farther.0, farther.1.hypot(FARTHER_SIGMA.hypot(SIGMA_PER_STEP * step)))
     }
 }
 
 /// Value and standard deviation `distance` pixels beyond the last pixel known.
 fn beyond(end: (f32, f32), distance: f32) -> (f32, f32) {
-    (end.0, end.1.hypot(BRIDGE_SIGMA.hypot(SIGMA_PER_PIXEL * distance)))
+    (end.0, end.1.hypot(BEYOND_SIGMA.hypot(SIGMA_PER_PIXEL * distance)))
 }
 
 #[cfg(test)]

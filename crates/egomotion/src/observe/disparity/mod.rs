@@ -7,6 +7,7 @@
 mod area;
 mod census;
 mod check;
+mod edges;
 mod fill;
 mod lanes;
 mod lucas_kanade;
@@ -206,6 +207,9 @@ impl DisparityMatcher {
                 fill::fill_row(to_shift, to_sigma, levels);
             }
         });
+        if options.matcher == Matcher::SemiGlobal {
+            edges::widen_beside_edges(&mut map);
+        }
         Ok(map)
     }
 
