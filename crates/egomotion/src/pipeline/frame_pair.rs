@@ -211,10 +211,10 @@ impl FramePair<'_> {
         let rows = row_disagreement(&self.before.images, tracks, self.rig);
         let (maps, obstacle, moving) = timed(&mut stages.maps_ms, || {
             let rigid = self.rigid(tracks, motion.as_ref().ok(), rows);
-            let groups = rigid.as_ref().map(|rigid| {
+            let groups = rigid.as_ref().zip(motion.as_ref().ok()).map(|(rigid, still)| {
                 let moving = Moving::find(&pair, (&self.before.images, &self.after.images), rigid);
                 let predict = |tracks: &[_], motion: &_| self.rigid(tracks, Some(motion), rows);
-                Groups::find(&pair, moving, self.config, self.dt_s(), predict)
+                Groups::find(&pair, moving, self.config, still, self.dt_s(), predict)
             });
             let (maps, mut seen) =
                 motion_maps(&pair, rigid.as_ref(), groups.as_ref(), self.config, self.dt_s());

@@ -122,23 +122,36 @@ impl MapRow {
 
     /// The pixels of bodies that move by themselves move as their bodies do.
     fn follow(&mut self, groups: &Groups<'_>, rays: Rays<'_>, v: usize) {
+        let bf = rays.rig.depth_disparity_product();
         for u in 0..self.width() {
             let Some(body) = groups.body(u, v) else { continue };
-            let measured = whole(self.velocity.each_ref().map(|plane| plane[u]));
-            if measured.vz().value().is_nan() {
+            let [d, variance, later, later_variance, shared] =
+                self.disparities.each_ref().map(|plane| plane[u]);
+            let xyd = Vector3::new(rays.at(u).x, rays.at(u).y, d);
+            if later.is_nan() {
+                // Disparity is a guess: the body's motion must do, as the scene's does elsewhere.
+                let own = body.rigid.as_ref().and_then(|rigid| rigid.depth_velocity(&xyd, self.sigma[u]));
+                if own.is_some_and(|own| !own.z_vz.cov.m22.is_nan()) {
+                    self.set_velocity(u, own);
+                }
                 continue;
             }
-            let (d, variance) = (self.disparities[0][u], self.disparities[1][u]);
-            let xyd = Vector3::new(rays.at(u).x, rays.at(u).y, d);
-            self.set_velocity(u, Some(body.depth_velocity(&measured, &xyd, variance)));
+            let cov = Matrix2::new(variance, shared, shared, later_variance);
+            let measured =
+                DepthVelocity::from_disparities(&Gaussian { mean: Vector2::new(d, later), cov }, bf);
+            if let Some(own) = body.depth_velocity(&measured, &xyd, variance) {
+                self.set_velocity(u, Some(own));
+            } else if groups.moving.is_moving(u, v) {
+                self.set_velocity(u, Some(body.scaled(&measured)));
+            }
         }
     }
 
     /// Whether pixels that move by themselves cross the window: as their bodies move, and never where they make none.
     fn cross_alone(&mut self, groups: &Groups<'_>, rays: Rays<'_>, when: (&VehicleWindow, f64), v: usize) {
-        for u in (0..self.width()).filter(|&u| groups.moving.is_moving(u, v)) {
+        for u in 0..self.width() {
             let Some(body) = groups.body(u, v) else {
-                self.crosses[u] = false;
+                self.crosses[u] &= !groups.moving.is_moving(u, v);
                 continue;
             };
             if let Some(rigid) = &body.rigid {
