@@ -102,7 +102,7 @@ impl Default for Config {
             estimator: EstimatorKind::Irls,
             observe: Observe::Dense,
             seed: 1,
-            block_px: 40.0,
+            block_px: 48.0,
             sample_step_px: 3,
             window: VehicleWindow::default(),
             tracks: TrackOptions::default(),
