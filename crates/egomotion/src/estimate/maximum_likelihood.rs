@@ -4,7 +4,8 @@
 //! With e their misclosure linearised at the current structure, S its covariance and G its
 //! derivative by φ, Gauss–Newton solves Σ Gᵀ S⁻¹ G δ = Σ Gᵀ S⁻¹ e; a zero variance before the
 //! motion is legal because S, never the measurement's covariance alone, is inverted. Robust
-//! weights are those of Student's t on q = eᵀ S⁻¹ e.
+//! weights are functions of q = eᵀ S⁻¹ e: those of Student's t beside a share of outliers, both as the
+//! residuals have them ([`super::mixture`]).
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
@@ -15,6 +16,7 @@ use super::blocks::{self, BlockScore, Blocks};
 use super::lmeds::{random_subsets, trials};
 use super::m_estimator::{LEAST_SCALE2, StudentT};
 use super::measurement::{At, Measurement};
+use super::mixture::Mixture;
 use super::step::{Step, Sums, Weighing};
 use super::systematic::CommonErrors;
 use super::{Estimate, MotionEstimate, Observability, Unsolvable, median};
@@ -25,7 +27,7 @@ use crate::observe::StereoTrack;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaximumLikelihoodOptions {
-    /// Distribution of the residuals; `nu` infinite is the Gaussian.
+    /// Distribution of the residuals: found from them, or Student's t; `nu` infinite is the Gaussian.
     pub kernel: StudentT,
     /// Largest share of outliers that the robust start provides for.
     pub outliers: f64,
@@ -66,7 +68,8 @@ pub struct MaximumLikelihood {
 /// Maximise the likelihood from a start.
 ///
 /// With `blocks` the covariance is block-wise, without them it is the model's: the inverse
-/// Gauss–Newton information with the structure eliminated, at the estimated structure.
+/// Gauss–Newton information with the structure eliminated, at the estimated structure, with a robust kernel
+/// times what its scale and weights make of independent residuals.
 ///
 /// # Errors
 /// [`Unsolvable`] with fewer than three usable observations, without any determined direction, or
@@ -78,44 +81,63 @@ pub fn maximum_likelihood<M: Measurement>(
     blocks: Option<&Blocks>,
     kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
-    let mut search = Search { phi: *start, scale2: 1.0 };
+    let mut search = Search::begin(observations, rig, start, kernel)?;
     let stride = observations.len() / COARSE;
     if stride > 1 {
         let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
-        search.begin(&few, rig, kernel)?;
-        // Few observations may leave open what all determine.
-        search = search.settle(&few, rig, None, kernel).map_or(search, |(found, _)| found);
+        search = search.approach(&few, rig, kernel)?;
     } else {
-        search.begin(observations, rig, kernel)?;
+        search = search.approach(observations, rig, kernel)?;
     }
     let (found, sums) = search.settle(observations, rig, blocks, kernel)?;
-    finish(&found, &sums, observations.len(), blocks)
+    finish(&found, &sums, observations.len(), blocks, kernel)
 }
 
 /// About so many observations bring the iteration near its end before all of them are used.
 const COARSE: usize = 4096;
+/// How near, as a share of the standard deviation, is near enough to look at the residuals again,
+const ROUGH: f64 = 0.3;
+/// which is done so often.
+const LOOKS: usize = 2;
 
 /// Where the iteration is.
 #[derive(Debug, Clone, Copy)]
 struct Search {
     phi: Twist,
-    /// Squared scale of the misclosures in units of their stated covariance.
+    /// What the misclosures look like in units of their stated covariance, times the squared scale.
+    mixture: Mixture,
     scale2: f64,
 }
 
 impl Search {
-    /// A robust first scale.
+    /// Residuals as they are at a motion.
     fn begin<M: Measurement>(
-        &mut self,
+        observations: &[M],
+        rig: &StereoRig,
+        phi: &Twist,
+        kernel: &StudentT,
+    ) -> Result<Self, Unsolvable> {
+        let stride = observations.len().div_ceil(COARSE).max(1);
+        let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
+        let (mixture, scale2) = Mixture::of(kernel, &mut squares(&few, &At::new(*phi, rig)))
+            .ok_or(Unsolvable::FewRows { rows: 0, needed: 3 })?;
+        Ok(Self { phi: *phi, mixture, scale2 })
+    }
+
+    /// Near the end: what residuals look like far from it is not what they look like there.
+    fn approach<M: Measurement>(
+        mut self,
         observations: &[M],
         rig: &StereoRig,
         kernel: &StudentT,
-    ) -> Result<(), Unsolvable> {
-        if kernel.nu.is_finite() {
-            self.scale2 = robust_scale2(observations, &self.phi, rig)
-                .ok_or(Unsolvable::FewRows { rows: 0, needed: 3 })?;
+    ) -> Result<Self, Unsolvable> {
+        let rough = StudentT { tolerance: ROUGH, ..*kernel };
+        for _ in 0..if kernel.nu.is_finite() && kernel.fitted { LOOKS } else { 1 } {
+            // Few observations may leave open what all determine.
+            let Ok((found, _)) = self.settle(observations, rig, None, &rough) else { return Ok(self) };
+            self = Self::begin(observations, rig, &found.phi, kernel)?;
         }
-        Ok(())
+        Ok(self)
     }
 
     /// Iterate until φ moves by less than the tolerance; with the sums of the last step.
@@ -130,7 +152,7 @@ impl Search {
         let mut last = 0.0;
         for _ in 0..kernel.iterations {
             let at = At::new(self.phi, rig);
-            let weighing = Weighing { blocks, kernel, scale2: self.scale2 };
+            let weighing = Weighing { blocks, mixture: self.mixture, scale2: self.scale2 };
             let sums = Sums::over(observations, &mut structures, &at, &weighing);
             let step = &sums.whole;
             if step.used < 3 {
@@ -171,17 +193,13 @@ fn direction(step: &Step) -> Result<Vector6<f64>, Unsolvable> {
 /// Newton's step is taken unless so many times as long as Gauss–Newton's.
 const LONGEST: f64 = 3.0;
 
-/// A robust first scale of q: its median over that of χ²₃, with the structure as measured.
-pub(super) fn robust_scale2<M: Measurement>(observations: &[M], phi: &Twist, rig: &StereoRig) -> Option<f64> {
-    let at = At::new(*phi, rig);
-    let mut squares: Vec<f64> = observations.iter().filter_map(|o| sampson(o, &at)).collect();
-    (!squares.is_empty()).then(|| (median(&mut squares) / 2.366).max(LEAST_SCALE2))
-}
-
-/// q with the structure held at its measured value (the Sampson form).
-fn sampson<M: Measurement>(observation: &M, at: &At<'_>) -> Option<f64> {
-    let l = observation.linearise(&mut observation.structure(), at)?;
-    Some(l.misclosure.dot(&(l.inverse_cov * l.misclosure)))
+/// q of every observation in front of the camera, with the structure held at its measured value (the Sampson form).
+pub(super) fn squares<M: Measurement>(observations: &[M], at: &At<'_>) -> Vec<f64> {
+    let square = |o: &M| {
+        let l = o.linearise(&mut o.structure(), at)?;
+        Some(l.misclosure.dot(&(l.inverse_cov * l.misclosure)))
+    };
+    observations.iter().filter_map(square).collect()
 }
 
 /// The answer from the sums of the last step, which was less than the tolerance.
@@ -190,6 +208,7 @@ fn finish(
     sums: &Sums,
     rows: usize,
     blocks: Option<&Blocks>,
+    kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
     let whole = &sums.whole;
     let observability = Observability::of(&whole.score.information)?;
@@ -198,7 +217,8 @@ fn finish(
             let scores: Vec<BlockScore<6>> = sums.by_block.iter().map(|step| step.score).collect();
             blocks::covariance(&scores, whole.bread().try_inverse().as_ref(), &observability)
         }
-        None => blocks::model_covariance(1.0, &observability),
+        None if kernel.nu.is_infinite() => blocks::model_covariance(1.0, &observability),
+        None => blocks::model_covariance(whole.spread(), &observability),
     };
     let freedom = (3 * whole.used).saturating_sub(6).max(1) as f64;
     Ok(MaximumLikelihood {
@@ -251,7 +271,10 @@ const FINALISTS: usize = 12;
 
 /// The `count` candidates with the least median of q, the best first.
 fn best(candidates: &[Twist], count: usize, sample: &[StereoTrack], rig: &StereoRig) -> Vec<Twist> {
-    let judge = |phi: &Twist| (robust_scale2(sample, phi, rig).unwrap_or(f64::INFINITY), *phi);
+    let judge = |phi: &Twist| {
+        let middle = median(&mut squares(sample, &At::new(*phi, rig)));
+        (if middle.is_nan() { f64::INFINITY } else { middle }, *phi)
+    };
     let mut judged: Vec<(f64, Twist)> = candidates.par_iter().map(judge).collect();
     judged.sort_by(|a, b| a.0.total_cmp(&b.0));
     judged.into_iter().take(count).map(|(_, phi)| phi).collect()
@@ -265,12 +288,29 @@ pub fn cramer_rao_bound<M: Measurement>(
     rig: &StereoRig,
     phi: &Twist,
 ) -> Option<Matrix6<f64>> {
-    let at = At::new(*phi, rig);
+    let structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
+    Some(efficient(observations, &structures, rig, phi)?.cov)
+}
+
+/// What no unbiased estimator does better than: one Gauss–Newton step from the true motion and structures.
+///
+/// Its covariance is the Cramér–Rao bound, and its error has exactly that covariance as long as the noise has
+/// the one it states: estimators are compared with it draw by draw. `None` when some direction is not determined.
+pub fn efficient<M: Measurement>(
+    observations: &[M],
+    structures: &[Vector3<f64>],
+    rig: &StereoRig,
+    phi: &Twist,
+) -> Option<Gaussian<6>> {
     let gaussian = StudentT { nu: f64::INFINITY, ..StudentT::default() };
-    let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
-    let weighing = Weighing { blocks: None, kernel: &gaussian, scale2: 1.0 };
-    let sums = Sums::over(observations, &mut structures, &at, &weighing);
-    let observability = Observability::of(&sums.whole.score.information).ok()?;
+    let weighing = Weighing { blocks: None, mixture: Mixture::student(&gaussian), scale2: 1.0 };
+    let sums = Sums::over(observations, &mut structures.to_vec(), &At::new(*phi, rig), &weighing);
+    let BlockScore { information, score } = sums.whole.score;
+    let observability = Observability::of(&information).ok()?;
     let observed: [bool; 6] = observability.observed();
-    observed.iter().all(|&o| o).then(|| blocks::model_covariance(1.0, &observability))
+    let step = observability.solve(&information, &score).ok()?;
+    observed.iter().all(|&o| o).then(|| Gaussian {
+        mean: phi.vector() + step,
+        cov: blocks::model_covariance(1.0, &observability),
+    })
 }

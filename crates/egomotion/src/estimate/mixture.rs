@@ -1,0 +1,226 @@
+//! What residuals look like: Student's t of the inliers beside outliers that may lie anywhere.
+//!
+//! The squared Mahalanobis lengths q of residuals in three dimensions are taken as a mixture, with probability
+//! 1 − ε from Student's t of ν degrees of freedom and scale s, with probability ε uniform in a ball that holds
+//! them all. Noise that is Gaussian is found to be (ν large), and little is lost; front ends on real images have
+//! heavy tails (ν small); outliers, even those that agree with each other, are left without any weight, because
+//! a uniform density says nothing about the motion.
+
+use super::m_estimator::{LEAST_SCALE2, StudentT};
+use super::median;
+
+/// Dimension of a residual.
+const DIMENSION: f64 = 3.0;
+
+/// Exponents m of the densities (1 + q/ν)^−m that are tried: ν = 2 m − 3 = 1, 3, 5, 9, 17, 37, 97.
+///
+/// Whole exponents spare an exponential for each observation. The last loses less than a thousandth on
+/// Gaussian residuals.
+const EXPONENTS: [i32; 7] = [2, 3, 4, 6, 10, 20, 50];
+/// The mixture is fitted to about so many residuals.
+const MOST: usize = 1000;
+/// Iterations for each exponent, from the result of the last.
+const ITERATIONS: usize = 10;
+/// The ball of the outliers reaches so many times the first scale at least.
+const LEAST_REACH: f64 = 10.0;
+/// Least and greatest share of outliers.
+const SHARE: (f64, f64) = (1e-3, 0.9);
+
+/// The weights of residuals in units of their scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mixture {
+    /// ν; infinite is the Gaussian.
+    nu: f64,
+    /// (ν + 3)/2 where outliers have a share.
+    exponent: i32,
+    /// Odds of a residual of length zero to be an outlier.
+    odds: f64,
+}
+
+impl Mixture {
+    /// Student's t alone.
+    pub fn student(kernel: &StudentT) -> Self {
+        Self { nu: kernel.nu, exponent: 0, odds: 0.0 }
+    }
+
+    /// Weight of a residual of squared length `q`, and −2 ∂ ln weight/∂q.
+    #[inline(always)]
+    pub fn weight(&self, q: f64) -> (f64, f64) {
+        if self.nu.is_infinite() {
+            return (1.0, 0.0);
+        }
+        let distance = self.nu + q;
+        let student = (self.nu + DIMENSION) / distance;
+        if self.odds == 0.0 {
+            return (student, 2.0 / distance);
+        }
+        let inlier = 1.0 / (1.0 + self.odds * (distance / self.nu).powi(self.exponent));
+        (student * inlier, 2.0 * (1.0 + f64::from(self.exponent) * (1.0 - inlier)) / distance)
+    }
+
+    /// The mixture that a kernel asks for, and the squared scale of the residuals, from their squared lengths.
+    ///
+    /// `None` without residuals. Reorders `squares`.
+    pub fn of(kernel: &StudentT, squares: &mut [f64]) -> Option<(Self, f64)> {
+        if kernel.nu.is_infinite() {
+            return Some((Self::student(kernel), 1.0));
+        }
+        if squares.is_empty() {
+            return None;
+        }
+        let stride = squares.len().div_ceil(MOST);
+        let few: Vec<f64> = squares.iter().step_by(stride).copied().collect();
+        // The median of χ²₃.
+        let scale2 = (median(squares) / 2.366).max(LEAST_SCALE2);
+        Some(if kernel.fitted { fitted(&few, scale2) } else { (Self::student(kernel), scale2) })
+    }
+}
+
+/// The most likely mixture, and its squared scale; `scale2` is a first guess.
+fn fitted(squares: &[f64], scale2: f64) -> (Mixture, f64) {
+    let reach2 = squares.iter().copied().fold(LEAST_REACH * LEAST_REACH * scale2, f64::max);
+    let volume = 4.0 / 3.0 * std::f64::consts::PI * reach2.powf(0.5 * DIMENSION);
+    let mut fit = Fit { scale2, share: 0.1, volume, squares };
+    let mut best = (f64::NEG_INFINITY, Mixture { nu: 4.0, exponent: 0, odds: 0.0 }, scale2);
+    for exponent in EXPONENTS {
+        for _ in 0..ITERATIONS {
+            fit.improve(exponent);
+        }
+        let likelihood = fit.log_likelihood(exponent);
+        if likelihood > best.0 {
+            best = (likelihood, fit.mixture(exponent), fit.scale2);
+        }
+    }
+    (best.1, best.2)
+}
+
+/// Expectation and maximisation over the scale and the share of outliers.
+struct Fit<'a> {
+    scale2: f64,
+    share: f64,
+    /// Of the ball of outliers.
+    volume: f64,
+    squares: &'a [f64],
+}
+
+impl Fit<'_> {
+    fn mixture(&self, exponent: i32) -> Mixture {
+        let odds = self.share / (1.0 - self.share) / (self.volume * self.peak(exponent));
+        Mixture { nu: degrees(exponent), exponent, odds }
+    }
+
+    /// Density of the t distribution at zero: Γ(m)/(Γ(m − 3/2) (ν π s²)^{3/2}).
+    fn peak(&self, exponent: i32) -> f64 {
+        let gamma_ratio = gamma_ratio(exponent);
+        gamma_ratio / (degrees(exponent) * std::f64::consts::PI * self.scale2).powf(0.5 * DIMENSION)
+    }
+
+    fn improve(&mut self, exponent: i32) {
+        let mixture = self.mixture(exponent);
+        let (nu, odds) = (mixture.nu, mixture.odds);
+        let (mut inliers, mut weights, mut square) = (0.0, 0.0, 0.0);
+        for q in self.squares {
+            let x = 1.0 + q / (nu * self.scale2);
+            let inlier = 1.0 / (1.0 + odds * x.powi(exponent));
+            inliers += inlier;
+            weights += inlier / x;
+            square += inlier / x * q;
+        }
+        self.share = (1.0 - inliers / self.squares.len() as f64).clamp(SHARE.0, SHARE.1);
+        if weights > 0.0 {
+            self.scale2 = (square / (DIMENSION * weights)).max(LEAST_SCALE2);
+        }
+    }
+
+    fn log_likelihood(&self, exponent: i32) -> f64 {
+        let (nu, outlier) = (degrees(exponent), self.share / self.volume);
+        let peak = (1.0 - self.share) * self.peak(exponent);
+        let density = |q: &f64| peak / (1.0 + q / (nu * self.scale2)).powi(exponent) + outlier;
+        self.squares.iter().map(|q| density(q).ln()).sum()
+    }
+}
+
+fn degrees(exponent: i32) -> f64 {
+    2.0 * f64::from(exponent) - DIMENSION
+}
+
+/// Γ(m)/Γ(m − 3/2).
+fn gamma_ratio(exponent: i32) -> f64 {
+    // Γ(2)/Γ(1/2), and Γ(x + 1) = x Γ(x).
+    (2..exponent).map(f64::from).fold(std::f64::consts::PI.sqrt().recip(), |ratio, m| ratio * m / (m - 1.5))
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+    use rand_pcg::Pcg64Mcg;
+
+    use super::*;
+
+    fn normal(rng: &mut Pcg64Mcg) -> f64 {
+        rng.sample(StandardNormal)
+    }
+
+    #[test]
+    fn the_density_is_one() {
+        // ∫ 4π r² p(r²) dr over the whole of space, by the midpoint rule on r = tan a.
+        for exponent in EXPONENTS {
+            let fit = Fit { scale2: 1.7, share: 0.0, volume: 1.0, squares: &[] };
+            let (n, peak, nu) = (200_000, fit.peak(exponent), degrees(exponent));
+            let width = std::f64::consts::FRAC_PI_2 / f64::from(n);
+            let at = |k: i32| {
+                let r = ((f64::from(k) + 0.5) * width).tan();
+                let density = peak / (1.0 + r * r / (nu * fit.scale2)).powi(exponent);
+                4.0 * std::f64::consts::PI * r * r * density * (1.0 + r * r) * width
+            };
+            let total: f64 = (0..n).map(at).sum();
+            assert!((total - 1.0).abs() < 1e-4, "{exponent}: {total}");
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_weights() {
+        for mixture in [
+            Mixture::student(&StudentT { nu: 4.0, ..StudentT::default() }),
+            Mixture { nu: 9.0, exponent: 6, odds: 1e-3 },
+            Mixture { nu: 97.0, exponent: 50, odds: 1e-5 },
+        ] {
+            for q in [0.1, 3.0, 11.0, 22.0, 60.0] {
+                let h = 1e-5;
+                let numeric = -(mixture.weight(q + h).0.ln() - mixture.weight(q - h).0.ln()) / h;
+                let slope = mixture.weight(q).1;
+                assert!((numeric - slope).abs() < 1e-6 * slope.max(1.0), "{mixture:?} {q}: {numeric} {slope}");
+            }
+        }
+        // However far, there is no overflow into something that is not a number.
+        let (weight, slope) = Mixture { nu: 97.0, exponent: 50, odds: 1e-5 }.weight(1e30);
+        assert!(weight == 0.0 && slope.is_finite());
+    }
+
+    #[test]
+    fn the_mixture_is_found() {
+        let mut rng = Pcg64Mcg::seed_from_u64(3);
+        for (nu, share) in [(f64::INFINITY, 0.0), (f64::INFINITY, 0.4), (3.0, 0.0), (3.0, 0.2)] {
+            let square = |i: usize| {
+                if (i as f64) < share * 2000.0 {
+                    return (0..3).map(|_| rng.random_range(-100.0..100.0f64).powi(2)).sum();
+                }
+                let length2: f64 = (0..3).map(|_| normal(&mut rng).powi(2)).sum();
+                let chi2: f64 = (0..3).map(|_| normal(&mut rng).powi(2)).sum();
+                4.0 * if nu.is_infinite() { length2 } else { length2 * 3.0 / chi2 }
+            };
+            let mut squares: Vec<f64> = (0..2000).map(square).collect();
+            let (found, scale2) = Mixture::of(&StudentT::default(), &mut squares).unwrap();
+            // With 1000 residuals the scale of a Gaussian is known to √(2/3000) = 2.6 %, that of a t to about twice that.
+            assert!((scale2 / 4.0 - 1.0).abs() < 0.15, "{nu} {share}: {found:?} {scale2}");
+            if nu.is_infinite() {
+                assert!(found.nu >= 17.0, "{share}: {found:?}");
+            } else {
+                assert!((1.0..=5.0).contains(&found.nu), "{share}: {found:?}");
+            }
+            // Outliers at 50 σ and the like have no weight left.
+            assert!(found.weight(2500.0).0 < if share > 0.0 { 1e-3 } else { 1e-2 }, "{found:?}");
+        }
+    }
+}
