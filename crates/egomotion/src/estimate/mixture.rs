@@ -9,6 +9,8 @@
 use super::m_estimator::{LEAST_SCALE2, StudentT};
 use super::median;
 
+/// Median of χ²₃.
+pub(super) const MEDIAN: f64 = 2.366;
 /// Dimension of a residual.
 const DIMENSION: f64 = 3.0;
 
@@ -43,6 +45,13 @@ impl Mixture {
         Self { nu: kernel.nu, exponent: 0, odds: 0.0 }
     }
 
+    /// Nearly Gaussian, with half the weight at `q` and soon none.
+    pub fn within(q: f64) -> Self {
+        let exponent = 50;
+        let nu = degrees(exponent);
+        Self { nu, exponent, odds: (1.0 + q / nu).powi(-exponent) }
+    }
+
     /// Weight of a residual of squared length `q`, and −2 ∂ ln weight/∂q.
     #[inline(always)]
     pub fn weight(&self, q: f64) -> (f64, f64) {
@@ -70,8 +79,7 @@ impl Mixture {
         }
         let stride = squares.len().div_ceil(MOST);
         let few: Vec<f64> = squares.iter().step_by(stride).copied().collect();
-        // The median of χ²₃.
-        let scale2 = (median(squares) / 2.366).max(LEAST_SCALE2);
+        let scale2 = (median(squares) / MEDIAN).max(LEAST_SCALE2);
         Some(if kernel.fitted { fitted(&few, scale2) } else { (Self::student(kernel), scale2) })
     }
 }
