@@ -16,6 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Result;
 use egomotion::study::assumptions::Assumptions;
 use egomotion::study::draw::Measuring;
+use egomotion::study::efficiency::Efficiency;
 use egomotion::study::real::LabStudy;
 use egomotion::study::sensitivity::{OneSetting, Sensitivity};
 use egomotion::study::uncertainty::Uncertainty;
@@ -24,7 +25,7 @@ use crate::run::set_threads;
 use crate::{Ending, terminal};
 
 pub use args::StudyCommand;
-use args::{LaboratoryArgs, TableArgs};
+use args::{EfficiencyArgs, LaboratoryArgs, TableArgs};
 use laboratory::{Laboratory, Options};
 
 /// Run what was asked for.
@@ -37,6 +38,7 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
         StudyCommand::Uncertainty(args) => alone(args, &uncertainty(args)),
         StudyCommand::Real(args) => real::run(args),
         StudyCommand::Assumptions(args) => alone(args, &Assumptions { seed: args.seed }),
+        StudyCommand::Efficiency(args) => alone(&args.laboratory, &efficiency(args)),
         StudyCommand::All(args) => {
             let mut laboratory = open(args, None, Some("The paper's studies, repeated"))?;
             // Its draws are of another kind and number.
@@ -45,6 +47,7 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
             // As many textures as it has by itself.
             laboratory.run(&LabStudy { first_seed: args.seed, ..LabStudy::default() })?;
             laboratory.run(&Assumptions { seed: args.seed })?;
+            laboratory.run(&Efficiency { seed: args.seed, ..Efficiency::default() })?;
             laboratory.close()
         }
     }
@@ -74,6 +77,16 @@ fn sensitivity(args: &LaboratoryArgs, sequences: Vec<String>) -> Sensitivity {
 fn uncertainty(args: &LaboratoryArgs) -> Uncertainty {
     let own = Uncertainty::default();
     Uncertainty { draws: args.draws.unwrap_or(own.draws), seed: args.seed, ..own }
+}
+
+fn efficiency(args: &EfficiencyArgs) -> Efficiency {
+    let own = Efficiency::default();
+    Efficiency {
+        sequences: args.sequences.clone().unwrap_or(own.sequences),
+        methods: args.methods().unwrap_or(own.methods),
+        draws: args.laboratory.draws.unwrap_or(own.draws),
+        seed: args.laboratory.seed,
+    }
 }
 
 /// Draws of a single setting where none are asked for.

@@ -23,7 +23,7 @@ pub struct StudentT {
 
 impl Default for StudentT {
     fn default() -> Self {
-        Self { nu: std::env::var("NU").map_or(4.0, |t| t.parse().unwrap_or(4.0)), fitted: true, iterations: 50, tolerance: std::env::var("TOL").map_or(1e-3, |t| t.parse().unwrap_or(1e-3)) }
+        Self { nu: 4.0, fitted: true, iterations: 50, tolerance: 1e-3 }
     }
 }
 

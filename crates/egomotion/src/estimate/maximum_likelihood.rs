@@ -261,18 +261,20 @@ pub fn robust_start(
     let candidates: Vec<Twist> = candidates.chain(prior.copied()).collect();
     let stride = (sample.len() / FIRST_LOOK).max(1);
     let glance: Vec<StereoTrack> = sample.iter().step_by(stride).copied().collect();
-    let finalists = best(&candidates, FINALISTS, &glance, rig);
-    let improved: Vec<Twist> =
-        best(&finalists, IMPROVED, &sample, rig).par_iter().map(|phi| concentrated(phi, &sample, rig)).collect();
+    let improve = |finalists: &[Twist], sample: &[StereoTrack]| -> Vec<Twist> {
+        finalists.par_iter().map(|phi| concentrated(phi, sample, rig)).collect()
+    };
+    let finalists = improve(&best(&candidates, FINALISTS, &glance, rig), &glance);
+    let improved = improve(&best(&finalists, IMPROVED, &sample, rig), &sample);
     best(&improved, 1, &sample, rig).first().copied().ok_or(Unsolvable::Unobservable)
 }
 
 /// Candidates are first judged on about so many observations,
 const FIRST_LOOK: usize = 100;
-/// so many of them on all,
-const FINALISTS: usize = 12;
-/// and so many of these are improved.
-const IMPROVED: usize = 4;
+/// so many of them are improved on these,
+const FINALISTS: usize = 16;
+/// and so many of those on all.
+const IMPROVED: usize = 3;
 /// Steps by which a candidate is improved,
 const CONCENTRATIONS: usize = 4;
 /// by observations whose q, were the median that of χ²₃, is below this: its 95th percentile.

@@ -1,10 +1,10 @@
-//! What residuals look like: Student's t of the inliers beside outliers that may lie anywhere.
+//! What residuals look like: Student's t of the inliers beside outliers at any distance.
 //!
-//! The squared Mahalanobis lengths q of residuals in three dimensions are taken as a mixture, with probability
-//! 1 − ε from Student's t of ν degrees of freedom and scale s, with probability ε uniform in a ball that holds
-//! them all. Noise that is Gaussian is found to be (ν large), and little is lost; front ends on real images have
-//! heavy tails (ν small); outliers, even those that agree with each other, are left without any weight, because
-//! a uniform density says nothing about the motion.
+//! The squared Mahalanobis lengths q of residuals in three dimensions are taken as a mixture: with probability
+//! 1 − ε Student's t of ν degrees of freedom and scale s; with probability ε an outlier, whose length r has no
+//! scale, so that ln r is about uniform up to the longest. Noise that is Gaussian is found to be (ν large), and
+//! little is lost; front ends on real images have heavier tails (ν small); outliers, even those that agree with
+//! each other, are left without any weight, because their density says nothing about the motion.
 
 use super::m_estimator::{LEAST_SCALE2, StudentT};
 use super::median;
@@ -14,16 +14,18 @@ pub(super) const MEDIAN: f64 = 2.366;
 /// Dimension of a residual.
 const DIMENSION: f64 = 3.0;
 
-/// Exponents m of the densities (1 + q/ν)^−m that are tried: ν = 2 m − 3 = 1, 3, 5, 9, 17, 37, 97.
+/// Exponents m of the densities (1 + q/ν)^−m that are tried: ν = 2 m − 3 = 3, 5, 9, 17, 37, 97.
 ///
 /// Whole exponents spare an exponential for each observation. The last loses less than a thousandth on
 /// Gaussian residuals.
-const EXPONENTS: [i32; 7] = [2, 3, 4, 6, 10, 20, 50];
+const EXPONENTS: [i32; 6] = [3, 4, 6, 10, 20, 50];
+/// The density of outliers is that of (CORE + q)^(−3/2).
+const CORE: f64 = 3.0;
 /// The mixture is fitted to about so many residuals.
 const MOST: usize = 1000;
 /// Iterations for each exponent, from the result of the last.
 const ITERATIONS: usize = 10;
-/// The ball of the outliers reaches so many times the first scale at least.
+/// Outliers reach so many times the first scale at least.
 const LEAST_REACH: f64 = 10.0;
 /// Least and greatest share of outliers.
 const SHARE: (f64, f64) = (1e-3, 0.9);
@@ -49,7 +51,7 @@ impl Mixture {
     pub fn within(q: f64) -> Self {
         let exponent = 50;
         let nu = degrees(exponent);
-        Self { nu, exponent, odds: (1.0 + q / nu).powi(-exponent) }
+        Self { nu, exponent, odds: (1.0 + q / nu).powi(-exponent) / scale_free(q) }
     }
 
     /// Weight of a residual of squared length `q`, and −2 ∂ ln weight/∂q.
@@ -63,8 +65,16 @@ impl Mixture {
         if self.odds == 0.0 {
             return (student, 2.0 / distance);
         }
-        let inlier = 1.0 / (1.0 + self.odds * (distance / self.nu).powi(self.exponent));
-        (student * inlier, 2.0 * (1.0 + f64::from(self.exponent) * (1.0 - inlier)) / distance)
+        let inlier = self.inlier(q);
+        let falling = f64::from(self.exponent) / distance - 0.5 * DIMENSION / (CORE + q);
+        (student * inlier, 2.0 * (1.0 / distance + falling * (1.0 - inlier)))
+    }
+
+    /// Probability that a residual is no outlier.
+    #[inline(always)]
+    fn inlier(&self, q: f64) -> f64 {
+        let x = 1.0 + q / self.nu;
+        1.0 / (1.0 + self.odds * x.powi(self.exponent) * scale_free(q))
     }
 
     /// The mixture that a kernel asks for, and the squared scale of the residuals, from their squared lengths.
@@ -87,8 +97,7 @@ impl Mixture {
 /// The most likely mixture, and its squared scale; `scale2` is a first guess.
 fn fitted(squares: &[f64], scale2: f64) -> (Mixture, f64) {
     let reach2 = squares.iter().copied().fold(LEAST_REACH * LEAST_REACH * scale2, f64::max);
-    let volume = 4.0 / 3.0 * std::f64::consts::PI * reach2.powf(0.5 * DIMENSION);
-    let mut fit = Fit { scale2, share: 0.1, volume, squares };
+    let mut fit = Fit { scale2, share: 0.1, reach2, squares };
     let mut best = (f64::NEG_INFINITY, Mixture { nu: 4.0, exponent: 0, odds: 0.0 }, scale2);
     for exponent in EXPONENTS {
         for _ in 0..ITERATIONS {
@@ -106,33 +115,40 @@ fn fitted(squares: &[f64], scale2: f64) -> (Mixture, f64) {
 struct Fit<'a> {
     scale2: f64,
     share: f64,
-    /// Of the ball of outliers.
-    volume: f64,
+    /// The longest squared length of an outlier.
+    reach2: f64,
     squares: &'a [f64],
 }
 
 impl Fit<'_> {
     fn mixture(&self, exponent: i32) -> Mixture {
-        let odds = self.share / (1.0 - self.share) / (self.volume * self.peak(exponent));
+        let odds = self.share / (1.0 - self.share) * self.outlier_peak() / self.peak(exponent);
         Mixture { nu: degrees(exponent), exponent, odds }
     }
 
     /// Density of the t distribution at zero: Γ(m)/(Γ(m − 3/2) (ν π s²)^{3/2}).
     fn peak(&self, exponent: i32) -> f64 {
-        let gamma_ratio = gamma_ratio(exponent);
-        gamma_ratio / (degrees(exponent) * std::f64::consts::PI * self.scale2).powf(0.5 * DIMENSION)
+        gamma_ratio(exponent) / (degrees(exponent) * std::f64::consts::PI * self.scale2).powf(0.5 * DIMENSION)
+    }
+
+    /// Density of outliers at zero: with r in units of √CORE s, ∫ r² (1 + r²)^(−3/2) dr = asinh r − r/√(1 + r²).
+    fn outlier_peak(&self) -> f64 {
+        let core2 = CORE * self.scale2;
+        let reach2 = self.reach2 / core2;
+        let reach = reach2.sqrt();
+        let integral = reach.asinh() - reach / (1.0 + reach2).sqrt();
+        1.0 / (4.0 * std::f64::consts::PI * integral * core2.powf(0.5 * DIMENSION))
     }
 
     fn improve(&mut self, exponent: i32) {
         let mixture = self.mixture(exponent);
-        let (nu, odds) = (mixture.nu, mixture.odds);
         let (mut inliers, mut weights, mut square) = (0.0, 0.0, 0.0);
         for q in self.squares {
-            let x = 1.0 + q / (nu * self.scale2);
-            let inlier = 1.0 / (1.0 + odds * x.powi(exponent));
+            let inlier = mixture.inlier(q / self.scale2);
+            let weight = inlier / (1.0 + q / (mixture.nu * self.scale2));
             inliers += inlier;
-            weights += inlier / x;
-            square += inlier / x * q;
+            weights += weight;
+            square += weight * q;
         }
         self.share = (1.0 - inliers / self.squares.len() as f64).clamp(SHARE.0, SHARE.1);
         if weights > 0.0 {
@@ -141,11 +157,21 @@ impl Fit<'_> {
     }
 
     fn log_likelihood(&self, exponent: i32) -> f64 {
-        let (nu, outlier) = (degrees(exponent), self.share / self.volume);
+        let (nu, outlier) = (degrees(exponent), self.share * self.outlier_peak());
         let peak = (1.0 - self.share) * self.peak(exponent);
-        let density = |q: &f64| peak / (1.0 + q / (nu * self.scale2)).powi(exponent) + outlier;
+        let density = |q: &f64| {
+            let q = q / self.scale2;
+            peak / (1.0 + q / nu).powi(exponent) + outlier * scale_free(q)
+        };
         self.squares.iter().map(|q| density(q).ln()).sum()
     }
+}
+
+/// (1 + q/CORE)^(−3/2).
+#[inline(always)]
+fn scale_free(q: f64) -> f64 {
+    let y = 1.0 + q / CORE;
+    1.0 / (y * y.sqrt())
 }
 
 fn degrees(exponent: i32) -> f64 {
@@ -170,21 +196,27 @@ mod tests {
         rng.sample(StandardNormal)
     }
 
+    /// ∫ 4π r² p(r²) dr up to `reach` by the midpoint rule on r = tan a.
+    fn total(reach: f64, density: impl Fn(f64) -> f64) -> f64 {
+        let n = 200_000;
+        let width = reach.atan() / f64::from(n);
+        let at = |k: i32| {
+            let r = ((f64::from(k) + 0.5) * width).tan();
+            4.0 * std::f64::consts::PI * r * r * density(r * r) * (1.0 + r * r) * width
+        };
+        (0..n).map(at).sum()
+    }
+
     #[test]
-    fn the_density_is_one() {
-        // ∫ 4π r² p(r²) dr over the whole of space, by the midpoint rule on r = tan a.
+    fn densities_are_those_of_probabilities() {
+        let fit = Fit { scale2: 1.7, share: 0.0, reach2: 400.0, squares: &[] };
         for exponent in EXPONENTS {
-            let fit = Fit { scale2: 1.7, share: 0.0, volume: 1.0, squares: &[] };
-            let (n, peak, nu) = (200_000, fit.peak(exponent), degrees(exponent));
-            let width = std::f64::consts::FRAC_PI_2 / f64::from(n);
-            let at = |k: i32| {
-                let r = ((f64::from(k) + 0.5) * width).tan();
-                let density = peak / (1.0 + r * r / (nu * fit.scale2)).powi(exponent);
-                4.0 * std::f64::consts::PI * r * r * density * (1.0 + r * r) * width
-            };
-            let total: f64 = (0..n).map(at).sum();
+            let (peak, nu) = (fit.peak(exponent), degrees(exponent));
+            let total = total(1e6, |q| peak / (1.0 + q / (nu * fit.scale2)).powi(exponent));
             assert!((total - 1.0).abs() < 1e-4, "{exponent}: {total}");
         }
+        let total = total(20.0, |q| fit.outlier_peak() * scale_free(q / fit.scale2));
+        assert!((total - 1.0).abs() < 1e-4, "{total}");
     }
 
     #[test]
