@@ -158,7 +158,7 @@ impl Search {
             if step.used < 3 {
                 return Err(Unsolvable::FewRows { rows: step.used, needed: 3 });
             }
-            let delta = direction(step)?;
+            let delta = direction(step, iteration < NEWTON)?;
             self.phi = Twist::from_vector(&(self.phi.vector() + delta));
             if kernel.nu.is_finite() {
                 self.scale2 = step.scale2().max(LEAST_SCALE2);
@@ -178,11 +178,11 @@ impl Search {
 }
 
 /// The step of φ: Newton's, with the weights' own change, near the end; Gauss–Newton's elsewhere.
-fn direction(step: &Step) -> Result<Vector6<f64>, Unsolvable> {
+fn direction(step: &Step, newton: bool) -> Result<Vector6<f64>, Unsolvable> {
     let (information, score) = (&step.score.information, &step.score.score);
     let observability = Observability::of(information)?;
     let plain = observability.solve(information, score)?;
-    if observability.rank() < 6 {
+    if observability.rank() < 6 || !newton {
         return Ok(plain);
     }
     let newton = step.bread().cholesky().map(|bread| bread.solve(score));
@@ -191,6 +191,9 @@ fn direction(step: &Step) -> Result<Vector6<f64>, Unsolvable> {
     Ok(newton.filter(|newton| length(newton) <= LONGEST.powi(2) * length(&plain)).unwrap_or(plain))
 }
 
+/// Where Newton's steps do not settle, from so many on only Gauss–Newton's are taken: each of them is one of expectation
+/// and maximisation, by which the likelihood does not fall.
+const NEWTON: usize = 12;
 /// Newton's step is taken unless so many times as long as Gauss–Newton's.
 const LONGEST: f64 = 3.0;
 

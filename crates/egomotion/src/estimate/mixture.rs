@@ -14,17 +14,17 @@ pub(super) const MEDIAN: f64 = 2.366;
 /// Dimension of a residual.
 const DIMENSION: f64 = 3.0;
 
-/// Exponents m of the densities (1 + q/ν)^−m that are tried: ν = 2 m − 3 = 3, 5, 9, 17, 37, 97.
+/// Exponents m of the densities (1 + q/ν)^−m that are tried: ν = 2 m − 3 = 3, 7, 17, 97.
 ///
 /// Whole exponents spare an exponential for each observation. The last loses less than a thousandth on
 /// Gaussian residuals.
-const EXPONENTS: [i32; 6] = [3, 4, 6, 10, 20, 50];
+const EXPONENTS: [i32; 4] = [3, 5, 10, 50];
 /// The density of outliers is that of (CORE + q)^(−3/2).
 const CORE: f64 = 3.0;
 /// The mixture is fitted to about so many residuals.
-const MOST: usize = 1000;
+const MOST: usize = 500;
 /// Iterations for each exponent, from the result of the last.
-const ITERATIONS: usize = 10;
+const ITERATIONS: usize = 8;
 /// Outliers reach so many times the first scale at least.
 const LEAST_REACH: f64 = 10.0;
 /// Least and greatest share of outliers.
@@ -104,9 +104,10 @@ fn fitted(squares: &[f64], scale2: f64) -> (Mixture, f64) {
             fit.improve(exponent);
         }
         let likelihood = fit.log_likelihood(exponent);
-        if likelihood > best.0 {
-            best = (likelihood, fit.mixture(exponent), fit.scale2);
+        if likelihood < best.0 {
+            break;
         }
+        best = (likelihood, fit.mixture(exponent), fit.scale2);
     }
     (best.1, best.2)
 }
@@ -252,12 +253,12 @@ mod tests {
             };
             let mut squares: Vec<f64> = (0..2000).map(square).collect();
             let (found, scale2) = Mixture::of(&StudentT::default(), &mut squares).unwrap();
-            // With 1000 residuals the scale of a Gaussian is known to √(2/3000) = 2.6 %, that of a t to about twice that.
-            assert!((scale2 / 4.0 - 1.0).abs() < 0.15, "{nu} {share}: {found:?} {scale2}");
+            // With 500 residuals the scale of a Gaussian is known to √(2/1500) = 3.7 %, that of a t, beside ν, to twice that.
+            assert!((scale2 / 4.0 - 1.0).abs() < 0.25, "{nu} {share}: {found:?} {scale2}");
             if nu.is_infinite() {
                 assert!(found.nu >= 17.0, "{share}: {found:?}");
             } else {
-                assert!((1.0..=5.0).contains(&found.nu), "{share}: {found:?}");
+                assert!((3.0..=7.0).contains(&found.nu), "{share}: {found:?}");
             }
             // Outliers at 50 σ and the like have no weight left.
             assert!(found.weight(2500.0).0 < if share > 0.0 { 1e-3 } else { 1e-2 }, "{found:?}");

@@ -21,15 +21,14 @@ const CONTENDERS: [(&str, Method, EstimatorKind); 9] = [
 const APPROACHES: [(&str, Approach); 2] =
     [("differential", Approach::Differential), ("discrete", Approach::Discrete)];
 
-/// All figures that the records have something for.
+/// Figures of one sequence, C where it is among them; the files hold every other.
 pub(super) fn figures(sequences: &[String], records: &[Record]) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    for sequence in sequences {
-        let plots = Plots { sequence, records };
-        figures.extend([plots.by_method(), plots.by_noise()]);
-        figures.extend([Kind::Uniform, Kind::Coherent].map(|kind| plots.by_outliers(kind)));
-    }
-    // One sequence shows all; the files hold every other.
+    let Some(sequence) = sequences.iter().find(|name| *name == "C").or(sequences.first()) else {
+        return Vec::new();
+    };
+    let plots = Plots { sequence, records };
+    let outliers = [Kind::Uniform, Kind::Coherent].map(|kind| plots.by_outliers(kind));
+    let mut figures: Vec<Figure> = [plots.by_method(), plots.by_noise()].into_iter().chain(outliers).collect();
     figures.retain(|figure| figure.panels.iter().any(has_a_line));
     figures
 }
