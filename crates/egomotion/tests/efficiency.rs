@@ -49,7 +49,10 @@ fn maximum_likelihood_reaches_the_bound() {
                 println!("{setting:?} {name}: {f:?} ± {nees_error}");
                 // What is found must mean something: the errors of a variance of its own draws would be 14 %.
                 assert!(error < 0.15, "{name} {f:?}");
-                assert!(f.variance_over_bound < 1.15 + error && f.variance_over_bound > 1.0 - error, "{name} {f:?}");
+                assert!(
+                    f.variance_over_bound < 1.15 + error && f.variance_over_bound > 1.0 - error,
+                    "{name} {f:?}"
+                );
                 // The bias is that of the difference from the efficient estimate, whose variance is at most .15.
                 let bias_error = 4.0 * (0.15f64 / 100.0).sqrt();
                 assert!(f.bias_over_sigma.abs() < 0.10 + bias_error, "{name} {f:?}");

@@ -264,12 +264,16 @@ pub fn robust_start(
     let candidates: Vec<Twist> = candidates.chain(prior.copied()).collect();
     let stride = (sample.len() / FIRST_LOOK).max(1);
     let glance: Vec<StereoTrack> = sample.iter().step_by(stride).copied().collect();
-    let improve = |finalists: &[Twist], sample: &[StereoTrack]| -> Vec<Twist> {
-        finalists.par_iter().map(|phi| concentrated(phi, sample, rig)).collect()
+    let improve = |candidates: Vec<(f64, Twist)>, sample: &[StereoTrack]| -> Vec<Twist> {
+        candidates.par_iter().map(|(_, phi)| concentrated(phi, sample, rig)).collect()
     };
-    let finalists = improve(&best(&candidates, FINALISTS, &glance, rig), &glance);
-    let improved = improve(&best(&finalists, IMPROVED, &sample, rig), &sample);
-    best(&improved, 1, &sample, rig).first().copied().ok_or(Unsolvable::Unobservable)
+    let finalists = best(&candidates, FINALISTS, &glance, rig);
+    if let Some((_, phi)) = finalists.first().filter(|(_, phi)| middle(phi, &sample, rig) < FITS * MEDIAN) {
+        return Ok(*phi);
+    }
+    let finalists = improve(finalists, &glance);
+    let improved = improve(best(&finalists, IMPROVED, &sample, rig), &sample);
+    best(&improved, 1, &sample, rig).first().map(|&(_, phi)| phi).ok_or(Unsolvable::Unobservable)
 }
 
 /// Candidates are first judged on about so many observations,
@@ -277,21 +281,29 @@ const FIRST_LOOK: usize = 100;
 /// so many of them are improved on these,
 const FINALISTS: usize = 16;
 /// and so many of those on all.
-const IMPROVED: usize = 3;
+const IMPROVED: usize = 4;
 /// Steps by which a candidate is improved,
 const CONCENTRATIONS: usize = 4;
 /// by observations whose q, were the median that of χ²₃, is below this: its 95th percentile.
 const NEAR: f64 = 7.8;
 
+/// A motion is no longer improved whose median of q is below so many times that of noise: most of the tracks fit,
+/// as is the rule when it was predicted.
+const FITS: f64 = 1.5;
+
+/// The median of q at a motion.
+fn middle(phi: &Twist, sample: &[StereoTrack], rig: &StereoRig) -> f64 {
+    let middle = median(&mut squares(sample, &At::new(*phi, rig)));
+    if middle.is_nan() { f64::INFINITY } else { middle }
+}
+
 /// The `count` candidates with the least median of q, the best first.
-fn best(candidates: &[Twist], count: usize, sample: &[StereoTrack], rig: &StereoRig) -> Vec<Twist> {
-    let judge = |phi: &Twist| {
-        let middle = median(&mut squares(sample, &At::new(*phi, rig)));
-        (if middle.is_nan() { f64::INFINITY } else { middle }, *phi)
-    };
-    let mut judged: Vec<(f64, Twist)> = candidates.par_iter().map(judge).collect();
+fn best(candidates: &[Twist], count: usize, sample: &[StereoTrack], rig: &StereoRig) -> Vec<(f64, Twist)> {
+    let mut judged: Vec<(f64, Twist)> =
+        candidates.par_iter().map(|phi| (middle(phi, sample, rig), *phi)).collect();
     judged.sort_by(|a, b| a.0.total_cmp(&b.0));
-    judged.into_iter().take(count).map(|(_, phi)| phi).collect()
+    judged.truncate(count);
+    judged
 }
 
 /// A candidate improved by steps on that part of the sample which it fits best: what it is made
@@ -302,7 +314,11 @@ fn concentrated(phi: &Twist, sample: &[StereoTrack], rig: &StereoRig) -> Twist {
         let at = At::new(phi, rig);
         let middle = median(&mut squares(sample, &at));
         let mut structures: Vec<Vector3<f64>> = sample.iter().map(Measurement::structure).collect();
-        let weighing = Weighing { blocks: None, mixture: Mixture::within(NEAR), scale2: (middle / MEDIAN).max(LEAST_SCALE2) };
+        let weighing = Weighing {
+            blocks: None,
+            mixture: Mixture::within(NEAR),
+            scale2: (middle / MEDIAN).max(LEAST_SCALE2),
+        };
         let step = Sums::over(sample, &mut structures, &at, &weighing).whole;
         let next = Observability::of(&step.score.information)
             .and_then(|observability| observability.solve(&step.score.information, &step.score.score));
@@ -341,8 +357,8 @@ pub fn efficient<M: Measurement>(
     let observability = Observability::of(&information).ok()?;
     let observed: [bool; 6] = observability.observed();
     let step = observability.solve(&information, &score).ok()?;
-    observed.iter().all(|&o| o).then(|| Gaussian {
-        mean: phi.vector() + step,
-        cov: blocks::model_covariance(1.0, &observability),
-    })
+    observed
+        .iter()
+        .all(|&o| o)
+        .then(|| Gaussian { mean: phi.vector() + step, cov: blocks::model_covariance(1.0, &observability) })
 }

@@ -231,7 +231,10 @@ mod tests {
                 let h = 1e-5;
                 let numeric = -(mixture.weight(q + h).0.ln() - mixture.weight(q - h).0.ln()) / h;
                 let slope = mixture.weight(q).1;
-                assert!((numeric - slope).abs() < 1e-6 * slope.max(1.0), "{mixture:?} {q}: {numeric} {slope}");
+                assert!(
+                    (numeric - slope).abs() < 1e-6 * slope.max(1.0),
+                    "{mixture:?} {q}: {numeric} {slope}"
+                );
             }
         }
         // However far, there is no overflow into something that is not a number.

@@ -45,7 +45,13 @@ const TURN: [f64; 6] = [0.0, 0.0, 0.0, 0.1, -0.25, 0.2];
 
 /// The scenes: what is missing, and one where nothing is.
 pub const SCENES: [Degenerate; 8] = [
-    Degenerate { name: "three planes", planes: &[SLANTED, SIDE, GROUND], motion: C, rows: None, points: POINTS },
+    Degenerate {
+        name: "three planes",
+        planes: &[SLANTED, SIDE, GROUND],
+        motion: C,
+        rows: None,
+        points: POINTS,
+    },
     Degenerate { name: "two planes", planes: &[SLANTED, SIDE], motion: C, rows: None, points: POINTS },
     Degenerate { name: "one plane", planes: &[SLANTED], motion: C, rows: None, points: POINTS },
     Degenerate { name: "a single depth", planes: &[WALL], motion: C, rows: None, points: POINTS },
@@ -134,7 +140,9 @@ impl Degenerate {
         let (width, height) = (rig.width_px as f64, rig.height_px as f64);
         let site = |i: usize| {
             let u = rng.random_range(0.0..width).floor();
-            let v = self.rows.map_or_else(|| rng.random_range(0.0..height).floor(), |rows| (40 + 9 * (i % rows)) as f64);
+            let v = self
+                .rows
+                .map_or_else(|| rng.random_range(0.0..height).floor(), |rows| (40 + 9 * (i % rows)) as f64);
             let strip = ((u / width * self.planes.len() as f64) as usize).min(self.planes.len() - 1);
             let (normal, offset) = self.planes[strip];
             Site::of_plane(rig, phi, &Vector3::from(normal), offset, rig.image_from_pixel(u, v))

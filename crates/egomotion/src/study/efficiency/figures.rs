@@ -28,7 +28,8 @@ pub(super) fn figures(sequences: &[String], records: &[Record]) -> Vec<Figure> {
     };
     let plots = Plots { sequence, records };
     let outliers = [Kind::Uniform, Kind::Coherent].map(|kind| plots.by_outliers(kind));
-    let mut figures: Vec<Figure> = [plots.by_method(), plots.by_noise()].into_iter().chain(outliers).collect();
+    let mut figures: Vec<Figure> =
+        [plots.by_method(), plots.by_noise()].into_iter().chain(outliers).collect();
     figures.retain(|figure| figure.panels.iter().any(has_a_line));
     figures
 }
@@ -53,7 +54,13 @@ impl Plots<'_> {
         })
     }
 
-    fn point(&self, x: usize, setting: &Setting, contender: &Contender, component: Option<usize>) -> Option<Point> {
+    fn point(
+        &self,
+        x: usize,
+        setting: &Setting,
+        contender: &Contender,
+        component: Option<usize>,
+    ) -> Option<Point> {
         let tally = &self.score(setting, contender)?.tally;
         let of = |i: usize| tally.figures(i).map(|f| (f.variance_over_bound, f.standard_error));
         let (y, standard_error) = match component {
@@ -109,11 +116,15 @@ impl Plots<'_> {
             });
             let mut series: Vec<Series> = series.collect();
             if !series.is_empty() {
-                let points = (0..6).map(|i| Point { x: f64::from(i), y: 1.0, standard_error: None }).collect();
+                let points =
+                    (0..6).map(|i| Point { x: f64::from(i), y: 1.0, standard_error: None }).collect();
                 series.push(Series { name: "bound".to_owned(), line: Line::Reference, points });
             }
             let x = Axis::places("component", COMPONENTS);
-            Panel { title: name.to_owned(), content: Content::Plot { x, y: Axis::log("variance/bound"), series } }
+            Panel {
+                title: name.to_owned(),
+                content: Content::Plot { x, y: Axis::log("variance/bound"), series },
+            }
         });
         let caption = "1/8 px of noise at both ends, 2048 points, no outliers. 1 is the Cramér–Rao bound.";
         self.figure("efficiency-method", "variance over the bound, by method", caption, panels.into())
@@ -126,11 +137,23 @@ impl Plots<'_> {
             let points = POINTS.map(|points| Setting { points, ..HELD });
             [
                 self.panel(format!("{name}, noise"), Axis::places("σ (px)", places), approach, &noise, None),
-                self.panel(format!("{name}, points"), Axis::places("points", POINTS), approach, &points, None),
+                self.panel(
+                    format!("{name}, points"),
+                    Axis::places("points", POINTS),
+                    approach,
+                    &points,
+                    None,
+                ),
             ]
         });
-        let caption = "The worst component of each contender. What is not swept is held at 1/8 px and 2048 points.";
-        self.figure("efficiency-noise", "variance over the bound, by noise and points", caption, panels.collect())
+        let caption =
+            "The worst component of each contender. What is not swept is held at 1/8 px and 2048 points.";
+        self.figure(
+            "efficiency-noise",
+            "variance over the bound, by noise and points",
+            caption,
+            panels.collect(),
+        )
     }
 
     fn by_outliers(&self, kind: Kind) -> Figure {

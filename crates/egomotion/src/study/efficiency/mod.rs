@@ -192,8 +192,7 @@ impl Study for Efficiency {
                 let of = |setting: &Setting| {
                     // Pixels have exact places in the differential form anyway.
                     let approaches = if setting.ends == Ends::Both { &BOTH[..] } else { &BOTH[1..] };
-                    let scores =
-                        setting.scores(&places, &self.contenders(approaches), self.draws, self.seed);
+                    let scores = setting.scores(&places, &self.contenders(approaches), self.draws, self.seed);
                     let setting = *setting;
                     scores.into_iter().map(move |score| Record::Errors {
                         sequence: name.clone(),
@@ -297,9 +296,7 @@ fn overview(records: &[Record]) -> Table {
             continue;
         }
         let all: Vec<_> = (0..6).filter_map(|i| score.tally.figures(i)).collect();
-        let most = |f: fn(&tally::Figures) -> f64| {
-            all.iter().map(f).reduce(f64::max)
-        };
+        let most = |f: fn(&tally::Figures) -> f64| all.iter().map(f).reduce(f64::max);
         let least = |f: fn(&tally::Figures) -> f64| all.iter().map(f).reduce(f64::min);
         let kind = match (setting.outliers > 0.0, setting.kind) {
             (false, _) => "",
@@ -326,7 +323,9 @@ fn overview(records: &[Record]) -> Table {
 fn observed(records: &[Record]) -> Table {
     let mut columns: Vec<(&str, &str)> =
         vec![("scene", "scene"), ("approach", "approach"), ("method", "method"), ("estimator", "estimator")];
-    columns.extend(COMPONENTS.iter().zip(["tX", "tY", "tZ", "ΩX", "ΩY", "ΩZ"]).map(|(name, heading)| (*name, heading)));
+    columns.extend(
+        COMPONENTS.iter().zip(["tX", "tY", "tZ", "ΩX", "ΩY", "ΩZ"]).map(|(name, heading)| (*name, heading)),
+    );
     columns.extend([("within_3_sigma", "within 3 σ"), ("answered", "answered"), ("draws", "draws")]);
     let mut table = Table::new(
         "efficiency-degenerate",

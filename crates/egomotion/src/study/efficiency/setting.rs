@@ -88,7 +88,8 @@ impl Place {
         let place = |k: i32| {
             let world = World::new(&sequence.scene, &sequence.rig, &phi, k, 1.0);
             let sites = |discrete: bool| {
-                let usable = world.pixels().iter().filter(|p| if discrete { p.discrete } else { p.differential });
+                let usable =
+                    world.pixels().iter().filter(|p| if discrete { p.discrete } else { p.differential });
                 usable.map(|pixel| Site::of_world(&world, pixel)).collect()
             };
             Self { rig: world.rig, phi: world.phi, differential: sites(false), discrete: sites(true) }
@@ -165,11 +166,17 @@ impl<'a> Trial<'a> {
         let (efficient, solve) = match approach {
             Approach::Differential => {
                 let draw = differential(&chosen.sites, setting, &mut rng);
-                (efficient(&draw.complete[..chosen.inliers], &structures, rig, phi), by_velocities(draw, rig, seed))
+                (
+                    efficient(&draw.complete[..chosen.inliers], &structures, rig, phi),
+                    by_velocities(draw, rig, seed),
+                )
             }
             Approach::Discrete => {
                 let draw = discrete(&chosen.sites, setting, &mut rng);
-                (efficient(&draw.complete[..chosen.inliers], &structures, rig, phi), by_displacements(draw, rig, seed))
+                (
+                    efficient(&draw.complete[..chosen.inliers], &structures, rig, phi),
+                    by_displacements(draw, rig, seed),
+                )
             }
         };
         Some(Self { approach, efficient: efficient?, solve })
@@ -186,11 +193,7 @@ fn config(contender: &Contender, seed: u64) -> Config {
 }
 
 /// Contenders on velocities; all start from the same robust motion.
-pub(super) fn by_velocities<'a>(
-    draw: Differential<'static>,
-    rig: &'a StereoRig,
-    seed: u64,
-) -> Solve<'a> {
+pub(super) fn by_velocities<'a>(draw: Differential<'static>, rig: &'a StereoRig, seed: u64) -> Solve<'a> {
     let tracks: Vec<StereoTrack> = draw.complete.iter().map(as_displacement).collect();
     let start = start(&tracks, rig, seed);
     Box::new(move |contender| {
@@ -204,11 +207,7 @@ pub(super) fn by_velocities<'a>(
 }
 
 /// Contenders on displacements; all start from the same robust motion.
-pub(super) fn by_displacements<'a>(
-    draw: Discrete<'static>,
-    rig: &'a StereoRig,
-    seed: u64,
-) -> Solve<'a> {
+pub(super) fn by_displacements<'a>(draw: Discrete<'static>, rig: &'a StereoRig, seed: u64) -> Solve<'a> {
     let start = start(&draw.complete, rig, seed);
     Box::new(move |contender| {
         let config = config(contender, seed);
