@@ -48,7 +48,7 @@ impl Plots<'_> {
         self.records.iter().find_map(|record| match record {
             Record::Errors { sequence, setting: at, score } => {
                 let same = sequence == self.sequence && at == setting && score.contender == *contender;
-                same.then_some(score)
+                same.then_some(score.as_ref())
             }
             Record::Observed { .. } => None,
         })

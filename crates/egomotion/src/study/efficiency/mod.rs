@@ -93,7 +93,7 @@ pub enum Record {
         /// The setting.
         setting: Setting,
         /// Who, and how wrong.
-        score: Score,
+        score: Box<Score>,
     },
     /// What is reported observed.
     Observed {
@@ -197,7 +197,7 @@ impl Study for Efficiency {
                     scores.into_iter().map(move |score| Record::Errors {
                         sequence: name.clone(),
                         setting,
-                        score,
+                        score: Box::new(score),
                     })
                 };
                 Ok(settings.iter().flat_map(of).collect())
