@@ -24,7 +24,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use scattered::{correlated, normals, phi, places, random, rig, stereo_flow};
 
-const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, iterations: 100, tolerance: 1e-6 };
+const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, fitted: false, iterations: 100, tolerance: 1e-6 };
 
 /// Blocks of 32 px over 320×240: 10 × 8.
 const BLOCKS: f64 = 80.0;

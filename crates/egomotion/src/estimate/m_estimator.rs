@@ -11,6 +11,10 @@ use super::{Fit, NormalEquations, Row, Unsolvable, median};
 pub struct StudentT {
     /// Degrees of freedom ν; small is heavy-tailed, infinite is Gaussian.
     pub nu: f64,
+    /// Whether maximum likelihood finds ν, and a share of outliers, from the residuals; see [`super::mixture`].
+    ///
+    /// Linear rows keep `nu`, and so does the Gaussian.
+    pub fitted: bool,
     /// Most iterations.
     pub iterations: usize,
     /// The iteration ends when no unknown moves by more than this share of its standard deviation.
@@ -19,7 +23,7 @@ pub struct StudentT {
 
 impl Default for StudentT {
     fn default() -> Self {
-        Self { nu: 4.0, iterations: 50, tolerance: 1e-3 }
+        Self { nu: 4.0, fitted: true, iterations: 50, tolerance: 1e-3 }
     }
 }
 

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::draw::{Differential, Discrete};
 use crate::estimate::alignment::Form;
-use crate::estimate::m_estimator::StudentT;
 use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{StereoRig, Twist};
@@ -67,15 +66,15 @@ impl Contender {
         }
     }
 
-    fn config(&self, seed: u64) -> Config {
+    /// How it is run in the synthetic world.
+    pub fn config(&self, seed: u64) -> Config {
         Config {
             method: self.method,
             approach: self.approach,
             estimator: self.estimator,
             seed,
-            // The noise of the synthetic world is Gaussian, so its likelihood is.
+            // Points of the synthetic world share no error of a matcher.
             maximum_likelihood: MaximumLikelihoodOptions {
-                kernel: StudentT { nu: f64::INFINITY, ..StudentT::default() },
                 phase_error_px: 0.0,
                 ..MaximumLikelihoodOptions::default()
             },
@@ -92,10 +91,9 @@ impl Contender {
         draw: &Differential<'_>,
         rig: &StereoRig,
         start: &Twist,
-        seed: u64,
+        config: &Config,
     ) -> Result<MotionEstimate, Unsolvable> {
-        let config = self.config(seed);
-        let solver = Solver::new(rig, start, &config);
+        let solver = Solver::new(rig, start, config);
         match self.method {
             Method::Dcce => {
                 let bf = rig.depth_disparity_product();
@@ -117,10 +115,9 @@ impl Contender {
         draw: &Discrete<'_>,
         rig: &StereoRig,
         start: &Twist,
-        seed: u64,
+        config: &Config,
     ) -> Result<MotionEstimate, Unsolvable> {
-        let config = self.config(seed);
-        let solver = Solver::new(rig, start, &config);
+        let solver = Solver::new(rig, start, config);
         let flows = || draw.motions.iter().map(|track| track.discrete_flow()).collect::<Vec<_>>();
         match self.method {
             Method::Dcce => {
