@@ -7,6 +7,7 @@ pub mod lmeds;
 pub mod m_estimator;
 pub mod maximum_likelihood;
 pub mod measurement;
+pub mod median_search;
 pub mod observability;
 pub mod row;
 mod step;
