@@ -3,11 +3,13 @@
 use nalgebra::SVector;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::least_squares::Weighting;
+use super::least_squares::{Weighting, least_squares};
+use super::median_search::{STRIP, square};
 pub use super::median_search::{Search, plain_search, search};
-use super::{Fit, NormalEquations, Row, Unsolvable};
+use super::{Fit, NormalEquations, Row, Unsolvable, median};
 
 /// How least median of squares searches and refits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -88,6 +90,14 @@ pub fn lmeds<const N: usize>(
 
 /// Reject rows beyond the cut of the robust scale around a found subset, then refit by least squares.
 ///
+/// With more than one refit the scale is taken anew around each answer: the best of few subsets lies so far from the
+/// minimum that its own median is up to a third too large.
+///
+/// Where many right-hand sides are exactly zero they were rounded, and the median knows only that no motion fits
+/// them perfectly. Then no row is an outlier whose residual its own σ explains, least squares of all rows is a second
+/// place to start from, and the better of the two answers is that with the lesser sum of squares in units of σ, cut off
+/// at the outliers' limit.
+///
 /// # Errors
 /// [`Unsolvable`] when the inliers determine nothing.
 pub fn refit<const N: usize>(
@@ -96,28 +106,91 @@ pub fn refit<const N: usize>(
     found: &Search<N>,
     options: &LmedsOptions,
 ) -> Result<Fit<N>, Unsolvable> {
-    let scale = robust_scale(found.median_square, rows.len(), N);
-    let keep = |theta: &SVector<f64, N>| -> Vec<f64> {
-        // Residuals of an exact fit are rounding errors; a scale of zero must not reject them all.
-        let limit = (options.cut * scale).powi(2).max(1e-24);
-        rows.iter()
-            .map(|row| {
-                let weight = weighting.of(row);
-                if weight * row.residual(theta).powi(2) <= limit { weight } else { 0.0 }
-            })
-            .collect()
-    };
-    let mut weights = keep(&found.theta);
-    let mut fit = NormalEquations::over(rows.iter().zip(weights.iter().copied())).solve()?;
-    for _ in 1..options.reweights.max(1) {
-        let next = keep(&fit.0);
-        if next == weights {
-            break;
-        }
-        weights = next;
-        fit = NormalEquations::over(rows.iter().zip(weights.iter().copied())).solve()?;
+    let refitting = Refitting { rows, weighting, options, rounded: options.reweights > 1 && are_rounded(rows) };
+    let first = refitting.settle(&found.theta, found.median_square);
+    if !refitting.rounded {
+        return first;
     }
-    let (theta, observability) = fit;
-    let inliers = weights.iter().filter(|&&w| w > 0.0).count();
-    Ok(Fit { theta, weights, observability, bread: None, inliers, residual_scale: scale })
+    let all = least_squares(rows, weighting)?.theta;
+    let second = refitting.settle(&all, refitting.median_square(&all));
+    match (first, second) {
+        (Ok(first), Ok(second)) => {
+            let second_is_better = refitting.cost(&second.theta) < refitting.cost(&first.theta);
+            Ok(if second_is_better { second } else { first })
+        }
+        (first, second) => first.or(second),
+    }
+}
+
+/// Share of right-hand sides that are exactly zero from which on they must have been rounded.
+const ROUNDED: f64 = 0.05;
+
+/// Whether right-hand sides were rounded: a continuous measurement is never exactly zero.
+fn are_rounded<const N: usize>(rows: &[Row<N>]) -> bool {
+    let zeros = rows.iter().filter(|row| row.b == 0.0).count();
+    zeros as f64 > ROUNDED * rows.len() as f64
+}
+
+/// The end of an iteration whose θ moves by less than this share of a standard deviation.
+const SETTLED: f64 = 1e-3;
+
+/// What refits go by.
+struct Refitting<'a, const N: usize> {
+    rows: &'a [Row<N>],
+    weighting: Weighting,
+    options: &'a LmedsOptions,
+    rounded: bool,
+}
+
+impl<const N: usize> Refitting<'_, N> {
+    fn median_square(&self, theta: &SVector<f64, N>) -> f64 {
+        let mut squares: Vec<f64> =
+            self.rows.par_iter().with_min_len(STRIP).map(|row| square(row, self.weighting, theta)).collect();
+        median(&mut squares)
+    }
+
+    /// Weights of the rows within the cut around θ; none for the others.
+    fn kept(&self, theta: &SVector<f64, N>, scale: f64) -> Vec<f64> {
+        // Residuals of an exact fit are rounding errors; a scale of zero must not reject them all.
+        let limit = (self.options.cut * scale).powi(2).max(1e-24);
+        let weigh = |row: &Row<N>| {
+            let weight = self.weighting.of(row);
+            let own = if self.rounded { weight * (self.options.cut * row.sigma).powi(2) } else { 0.0 };
+            if weight * row.residual(theta).powi(2) <= limit.max(own) { weight } else { 0.0 }
+        };
+        self.rows.par_iter().with_min_len(STRIP).map(weigh).collect()
+    }
+
+    /// Least squares of what is kept, until that settles.
+    fn settle(&self, theta: &SVector<f64, N>, median_square: f64) -> Result<Fit<N>, Unsolvable> {
+        let scale_of = |median_square| robust_scale(median_square, self.rows.len(), N);
+        let mut scale = scale_of(median_square);
+        let mut weights = self.kept(theta, scale);
+        let mut equations = NormalEquations::weighted(self.rows, &weights);
+        let mut fit = equations.solve()?;
+        for _ in 1..self.options.reweights.max(1) {
+            scale = scale_of(self.median_square(&fit.0));
+            let next = self.kept(&fit.0, scale);
+            if next == weights {
+                break;
+            }
+            weights = next;
+            equations = NormalEquations::weighted(self.rows, &weights);
+            let last = std::mem::replace(&mut fit, equations.solve()?);
+            let moved = (fit.0 - last.0).component_mul(&equations.information.diagonal().map(f64::sqrt));
+            if moved.amax() <= SETTLED * scale {
+                break;
+            }
+        }
+        let (theta, observability) = fit;
+        let inliers = weights.iter().filter(|&&w| w > 0.0).count();
+        Ok(Fit { theta, weights, observability, bread: None, inliers, residual_scale: scale })
+    }
+
+    /// Sum of squared residuals in units of σ, none counted beyond the cut.
+    fn cost(&self, theta: &SVector<f64, N>) -> f64 {
+        let most = self.options.cut.powi(2);
+        // The lesser of the two is never NaN.
+        self.rows.iter().map(|row| (row.residual(theta) / row.sigma).powi(2).min(most)).sum()
+    }
 }

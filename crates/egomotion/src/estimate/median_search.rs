@@ -135,7 +135,7 @@ fn in_order_of_promise<const N: usize>(
 }
 
 /// Rows whose squares are taken at once by one thread.
-const STRIP: usize = 8192;
+pub(super) const STRIP: usize = 8192;
 
 /// Median of the squared residuals; `None` where it exceeds `limit`.
 fn median_within<const N: usize>(
@@ -174,7 +174,7 @@ struct Chunk<const N: usize> {
 }
 
 /// Candidates that are counted together.
-const TOGETHER: usize = 16;
+const TOGETHER: usize = 36;
 
 impl<const N: usize> Columns<N> {
     fn of(rows: &[Row<N>], weighting: Weighting) -> Self {
@@ -231,31 +231,41 @@ impl<const N: usize> Chunk<N> {
         if !(reach < 1e30 && bound.is_finite() && theta.amax() < 1e30) {
             return 0;
         }
-        let theta: [f32; N] = std::array::from_fn(|j| theta[j] as f32);
-        let mut rest = self.b;
-        for (a, t) in self.a.chunks(3).zip(theta.chunks(3)) {
-            match (a, t) {
-                ([a, b, c], &[t, u, v]) => less_three(&mut rest, [a, b, c], [t, u, v]),
-                _ => a.iter().zip(t).for_each(|(a, &t)| less_three(&mut rest, [a; 3], [t, 0.0, 0.0])),
-            }
+        match N {
+            0..=3 => count_three(&self.b, self.columns(), single(theta), bound),
+            4..=6 => count_six(&self.b, self.columns(), single(theta), bound),
+            // Nothing is certain of more unknowns than any of the methods has.
+            _ => 0,
         }
-        count_beyond(&rest, bound)
+    }
+
+    /// The columns of M ≥ N unknowns, of which those that are not there do not count.
+    fn columns<const M: usize>(&self) -> [&[f32; CHUNK]; M] {
+        std::array::from_fn(|j| self.a.get(j).unwrap_or(&self.b))
+    }
+}
+
+/// θ of M ≥ N unknowns.
+fn single<const N: usize, const M: usize>(theta: &SVector<f64, N>) -> [f32; M] {
+    std::array::from_fn(|j| theta.get(j).map_or(0.0, |&v| v as f32))
+}
+
+vectorised! {
+    /// How many residuals in three unknowns exceed the bound.
+    count_three(b: &[f32; CHUNK], a: [&[f32; CHUNK]; 3], t: [f32; 3], bound: f32) -> usize {
+        let residual = |k: usize| b[k] - (a[0][k] * t[0] + a[1][k] * t[1] + a[2][k] * t[2]);
+        (0..CHUNK).map(|k| u32::from(residual(k).abs() > bound)).sum::<u32>() as usize
     }
 }
 
 vectorised! {
-    /// r − a t for three columns.
-    less_three(rest: &mut [f32; CHUNK], a: [&[f32; CHUNK]; 3], t: [f32; 3]) {
-        for k in 0..CHUNK {
-            rest[k] -= a[0][k] * t[0] + a[1][k] * t[1] + a[2][k] * t[2];
-        }
-    }
-}
-
-vectorised! {
-    /// How many exceed the bound.
-    count_beyond(rest: &[f32; CHUNK], bound: f32) -> usize {
-        rest.iter().map(|r| u32::from(r.abs() > bound)).sum::<u32>() as usize
+    /// How many residuals in six unknowns exceed the bound.
+    count_six(b: &[f32; CHUNK], a: [&[f32; CHUNK]; 6], t: [f32; 6], bound: f32) -> usize {
+        let residual = |k: usize| {
+            b[k] - (a[0][k] * t[0] + a[1][k] * t[1] + a[2][k] * t[2])
+                - (a[3][k] * t[3] + a[4][k] * t[4] + a[5][k] * t[5])
+        };
+        (0..CHUNK).map(|k| u32::from(residual(k).abs() > bound)).sum::<u32>() as usize
     }
 }
 

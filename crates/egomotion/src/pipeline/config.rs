@@ -48,6 +48,8 @@ pub enum EstimatorKind {
     Lmeds,
     /// Iteratively reweighted least squares, rows weighted by their own variance.
     Irls,
+    /// Errors in variables: the same weights, without the bias that noisy gradients bring; for `dcce` alone.
+    Eiv,
 }
 
 /// What is measured in the images.
@@ -76,6 +78,9 @@ pub struct Config {
     pub seed: u64,
     /// Side of the blocks of pixels that count as independent in covariances, in pixels.
     pub block_px: f64,
+    /// Pixels of a disparity map have noise of their own, as in synthetic draws: with `eiv`, rows are then correlated as
+    /// their central differences share pixels, and not block by block.
+    pub independent_pixels: bool,
     /// Dense observations are taken from every n-th pixel in both directions.
     pub sample_step_px: usize,
     /// What the vehicle sweeps.
@@ -103,6 +108,7 @@ impl Default for Config {
             observe: Observe::Dense,
             seed: 1,
             block_px: 64.0,
+            independent_pixels: false,
             sample_step_px: 3,
             window: VehicleWindow::default(),
             tracks: TrackOptions::default(),
@@ -123,6 +129,11 @@ pub enum ConfigError {
         "method ml weighs its observations robustly itself: use estimator irls (the default), not ls or lmeds"
     )]
     MaximumLikelihoodEstimator,
+    /// Only the depth change constraint has measured gradients among its regressors.
+    #[error(
+        "estimator eiv corrects for the noisy gradients of method dcce, which no other method has: use method dcce, or estimator irls (the default)"
+    )]
+    ErrorsInVariablesMethod,
     /// Alignment needs points before and after.
     #[error(
         "methods rigid and linear22 align points before and after: use approach discrete (the default), not differential"
@@ -148,7 +159,13 @@ impl Config {
     /// [`ConfigError`] gives the reason.
     pub fn check(&self) -> Result<(), ConfigError> {
         if self.method == Method::Ml && self.estimator != EstimatorKind::Irls {
-            return Err(ConfigError::MaximumLikelihoodEstimator);
+            return Err(match self.estimator {
+                EstimatorKind::Eiv => ConfigError::ErrorsInVariablesMethod,
+                _ => ConfigError::MaximumLikelihoodEstimator,
+            });
+        }
+        if self.method != Method::Dcce && self.estimator == EstimatorKind::Eiv {
+            return Err(ConfigError::ErrorsInVariablesMethod);
         }
         let alignment = matches!(self.method, Method::Rigid | Method::Linear22);
         if alignment && self.approach == Approach::Differential {

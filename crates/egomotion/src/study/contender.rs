@@ -42,7 +42,8 @@ impl Contender {
         let linear = methods.iter().flat_map(|&method| {
             estimators.into_iter().map(move |estimator| Self { approach, method, estimator })
         });
-        linear.chain([Self { approach, method: M::Ml, estimator: E::Irls }]).collect()
+        let corrected = Self { approach, method: M::Dcce, estimator: E::Eiv };
+        linear.chain([corrected]).chain([Self { approach, method: M::Ml, estimator: E::Irls }]).collect()
     }
 
     /// Name of the method, in files.
@@ -64,6 +65,7 @@ impl Contender {
             (_, EstimatorKind::Ls) => "ls",
             (_, EstimatorKind::Lmeds) => "lmeds",
             (_, EstimatorKind::Irls) => "irls",
+            (_, EstimatorKind::Eiv) => "eiv",
         }
     }
 
@@ -72,6 +74,7 @@ impl Contender {
             method: self.method,
             approach: self.approach,
             estimator: self.estimator,
+            independent_pixels: true,
             seed,
             // The noise of the synthetic world is Gaussian, so its likelihood is.
             maximum_likelihood: MaximumLikelihoodOptions {
