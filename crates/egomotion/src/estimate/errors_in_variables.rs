@@ -11,10 +11,13 @@
 //! al. 2000 have it). Only the covariances' shape matters, not their scale. The derivative of the score is that of
 //! exact regressors, Σ w (ĝ ĝᵀ − cov ĝ)/V: the corrected normal equations (Fuller 1987).
 //!
+//! What is left is the error of differences in place of derivatives: on a surface that is curved along the way a point
+//! goes in an interval, d_t has a part of third order (of second in the discrete form), which no noise model tells.
+//!
 //! Noise alone fills the plain normal equations up to full rank. A direction is determined only where what is left of
 //! them after the correction exceeds what the noise's own scatter could leave.
 
-use nalgebra::{DMatrix, DVector, Matrix4, Matrix6, RowVector3, SMatrix, Vector3, Vector4, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix4, Matrix6, RowVector3, SMatrix, SVector, Vector3, Vector4, Vector6};
 use rayon::prelude::*;
 
 use super::blocks::{self, BlockScore, Blocks};
@@ -200,8 +203,8 @@ struct Sums {
     bread: Matrix6<f64>,
     /// Σ w s² cov ĝ/V.
     noise: Matrix6<f64>,
-    /// Σ of the squares of what `noise` sums up, on the diagonal.
-    noise_square: Vector6<f64>,
+    /// Σ n nᵀ over the rows, n the 21 numbers of what each adds to `noise`.
+    noise_square: SMatrix<f64, 21, 21>,
     /// Σ w e²/V.
     square: f64,
     used: usize,
@@ -230,7 +233,7 @@ const INLIER_Q: f64 = 6.635;
 impl Sums {
     fn zero() -> Self {
         let zero = Matrix6::zeros();
-        Self { score: Vector6::zeros(), information: zero, bread: zero, noise: zero, noise_square: Vector6::zeros(), square: 0.0, used: 0, inliers: 0 }
+        Self { score: Vector6::zeros(), information: zero, bread: zero, noise: zero, noise_square: SMatrix::zeros(), square: 0.0, used: 0, inliers: 0 }
     }
 
     fn over(changes: &[DisparityChange], at: &At<'_>, weighing: &Weighing<'_>, equations: Equations) -> Self {
@@ -278,7 +281,8 @@ impl Sums {
         self.information += weight * (outer - noise) - shared;
         self.bread += slope * (outer - noise) - shared;
         self.noise += weight * noise;
-        self.noise_square += (weight * noise.diagonal()).map(|v| v * v);
+        let noise = triangle(|i, j| weight * noise[(i, j)]);
+        self.noise_square.ger(1.0, &noise, &noise, 1.0);
         self.square += weight * row.standard * row.standard;
         self.used += 1;
         self.inliers += usize::from(q <= INLIER_Q);
@@ -336,7 +340,7 @@ impl<'a> Search<'a> {
             if sums.used < 6 {
                 return Err(Unsolvable::FewRows { rows: sums.used, needed: 6 });
             }
-            let delta = determined(&sums)?.solve(&sums.information, &sums.score)?;
+            let delta = determined(&sums, &self.at().by_phi)?.solve(&sums.information, &sums.score)?;
             self.phi = Twist::from_vector(&(self.phi.vector() + delta));
             self.scale2 = (sums.square / (sums.used - 6).max(1) as f64).max(LEAST_SCALE2);
             let moved = delta.component_mul(&sums.information.diagonal().map(|v| v.max(0.0).sqrt())).amax();
@@ -359,18 +363,25 @@ fn first_scale2(changes: &[DisparityChange], at: &At<'_>, kernel: &StudentT) -> 
 }
 
 /// A direction is determined whose information exceeds so many standard errors of its correction.
-const CERTAIN: f64 = 3.0;
+const CERTAIN: f64 = 2.0;
 
 /// How much the squares of neighbouring rows' noise add to the scatter of the correction: at most half again as much,
 /// since central differences two pixels apart are correlated by −½.
 const NEIGHBOURS: f64 = 1.5;
 
+/// The upper triangle of a symmetric 6×6 matrix, row by row.
+fn triangle(entry: impl Fn(usize, usize) -> f64) -> SVector<f64, 21> {
+    SVector::from_iterator((0..6).flat_map(|i| (i..6).map(move |j| (i, j))).map(|(i, j)| entry(i, j)))
+}
+
 /// Eigen-analysis of the corrected information, tested against what scatters of its correction.
-fn determined(sums: &Sums) -> Result<Observability, Unsolvable> {
-    // The square of a normal number of variance C scatters by √2 C, which averages out over the rows.
-    let relative = |j: usize| sums.noise_square[j].sqrt() / sums.noise[(j, j)];
-    let most = (0..6).map(relative).filter(|r| r.is_finite()).fold(0.0, f64::max);
-    Observability::beyond_noise(&sums.information, &sums.noise, CERTAIN * (2.0 * NEIGHBOURS).sqrt() * most)
+fn determined(sums: &Sums, by_phi: &Matrix6<f64>) -> Result<Observability, Unsolvable> {
+    Observability::beyond_noise(&sums.information, &sums.noise, |direction: &Vector6<f64>| {
+        // The square of a normal number of variance C has the variance 2 C²; C is the rows' noise along the direction.
+        let q = by_phi * direction;
+        let along = triangle(|i, j| if i == j { q[i] * q[i] } else { 2.0 * q[i] * q[j] });
+        CERTAIN * (2.0 * NEIGHBOURS * along.dot(&(sums.noise_square * along)).max(0.0)).sqrt()
+    })
 }
 
 /// Where the iteration has settled.
@@ -383,7 +394,7 @@ struct Answer<'a> {
 impl Answer<'_> {
     fn estimate(&self, rows: usize, blocks: Option<&Blocks>) -> Result<MotionEstimate, Unsolvable> {
         let sums = Sums::over(self.changes, &self.at, &self.weighing, Equations::Conditional);
-        let observability = determined(&sums)?;
+        let observability = determined(&sums, &self.at.by_phi)?;
         let inverse = sums.bread.cholesky().map(|bread| bread.inverse());
         let cov = match blocks {
             Some(blocks) => blocks::covariance(&self.by_block(blocks), inverse.as_ref(), &observability),

@@ -65,8 +65,8 @@ impl Observability {
 
     /// Analyse information from which the share of noise was subtracted.
     ///
-    /// A direction is determined only where its information exceeds `uncertain` times that share: what is less may be
-    /// what the subtraction left. An undetermined direction is then known no better, so that a component is observed
+    /// A direction x is determined only where its information xᵀ A x exceeds `uncertain(x)`: what is less may be what the
+    /// subtraction left. An undetermined direction is then known no better, so that a component is observed
     /// although it has a little of itself there.
     ///
     /// # Errors
@@ -74,18 +74,15 @@ impl Observability {
     pub fn beyond_noise<const N: usize>(
         information: &SMatrix<f64, N, N>,
         noise: &SMatrix<f64, N, N>,
-        uncertain: f64,
+        uncertain: impl Fn(&SVector<f64, N>) -> f64,
     ) -> Result<Self, Unsolvable> {
         let plain = Self::of(&(information + noise))?;
-        let scaled = |m: &SMatrix<f64, N, N>| {
-            DMatrix::from_fn(N, N, |i, j| m[(i, j)] * plain.scale[i] * plain.scale[j])
-        };
-        let noise = scaled(noise);
-        let eigen = scaled(information).symmetric_eigen();
+        let scale = &plain.scale;
+        let scaled = DMatrix::from_fn(N, N, |i, j| information[(i, j)] * scale[i] * scale[j]);
+        let eigen = scaled.symmetric_eigen();
         let least = RANK_TOLERANCE * plain.eigenvalues.max();
         let floors = DVector::from_fn(N, |k, _| {
-            let direction = eigen.eigenvectors.column(k);
-            (uncertain * (direction.transpose() * &noise * direction)[0]).max(least)
+            uncertain(&SVector::from_fn(|i, _| eigen.eigenvectors[(i, k)] * scale[i])).max(least)
         });
         let mut found = Self {
             scale: plain.scale,
