@@ -58,25 +58,50 @@ impl DisparityChange {
         let (jacobian, dt) = match form {
             Form::Differential => (
                 Matrix4::new(
-                    slope(d), 0.0, 0.0, 0.0, //
-                    bend * zx, slope(d), 0.0, 0.0, //
-                    bend * zy, 0.0, slope(d), 0.0, //
-                    bend * zt, 0.0, 0.0, slope(d),
+                    slope(d),
+                    0.0,
+                    0.0,
+                    0.0, //
+                    bend * zx,
+                    slope(d),
+                    0.0,
+                    0.0, //
+                    bend * zy,
+                    0.0,
+                    slope(d),
+                    0.0, //
+                    bend * zt,
+                    0.0,
+                    0.0,
+                    slope(d),
                 ),
                 slope(d) * zt,
             ),
             Form::Discrete => (
                 Matrix4::new(
-                    slope(d), 0.0, 0.0, 0.0, //
-                    bend * zx, slope(after), 0.0, bend * zx, //
-                    bend * zy, 0.0, slope(after), bend * zy, //
-                    slope(after) - slope(d), 0.0, 0.0, slope(after),
+                    slope(d),
+                    0.0,
+                    0.0,
+                    0.0, //
+                    bend * zx,
+                    slope(after),
+                    0.0,
+                    bend * zx, //
+                    bend * zy,
+                    0.0,
+                    slope(after),
+                    bend * zy, //
+                    slope(after) - slope(d),
+                    0.0,
+                    0.0,
+                    slope(after),
                 ),
                 after - d,
             ),
         };
         let gaussian = change.depth.propagate(Vector4::new(d, dx, dy, dt), &jacobian);
-        let usable = d > 0.0 && after > 0.0 && gaussian.cov.iter().chain(gaussian.mean.iter()).all(|v| v.is_finite());
+        let usable =
+            d > 0.0 && after > 0.0 && gaussian.cov.iter().chain(gaussian.mean.iter()).all(|v| v.is_finite());
         usable.then_some(Self { x: change.x_px, y: change.y_px, mean: gaussian.mean, cov: gaussian.cov })
     }
 }
@@ -150,7 +175,9 @@ impl<'a> At<'a> {
         let g = (direction * velocities).transpose();
         // How both change with d: (u, v, s) exactly, the regressors to first order in the motion.
         let step = 1e-4 * d;
-        let shift_by_d = (self.moved(&(xyd + Vector3::z() * step))?.1 - self.moved(&(xyd - Vector3::z() * step))?.1) / (2.0 * step);
+        let shift_by_d = (self.moved(&(xyd + Vector3::z() * step))?.1
+            - self.moved(&(xyd - Vector3::z() * step))?.1)
+            / (2.0 * step);
         let by_d = (direction * velocities_by_disparity(&place, self.rig)).transpose();
         let e_by = Vector4::new((direction * shift_by_d)[0], shift.x, shift.y, 1.0);
         let g_by = SMatrix::<f64, 6, 4>::from_columns(&[
@@ -227,13 +254,25 @@ impl<'a> Weighing<'a> {
     }
 }
 
+/// Every so many rows the squares of their noise are taken, which stand for the others'.
+const SAMPLED: usize = 16;
+
 /// Squared residual, in units of its scaled variance, beyond which a row is no inlier: χ²₁(0.99).
 const INLIER_Q: f64 = 6.635;
 
 impl Sums {
     fn zero() -> Self {
         let zero = Matrix6::zeros();
-        Self { score: Vector6::zeros(), information: zero, bread: zero, noise: zero, noise_square: SMatrix::zeros(), square: 0.0, used: 0, inliers: 0 }
+        Self {
+            score: Vector6::zeros(),
+            information: zero,
+            bread: zero,
+            noise: zero,
+            noise_square: SMatrix::zeros(),
+            square: 0.0,
+            used: 0,
+            inliers: 0,
+        }
     }
 
     fn over(changes: &[DisparityChange], at: &At<'_>, weighing: &Weighing<'_>, equations: Equations) -> Self {
@@ -241,7 +280,10 @@ impl Sums {
             .par_chunks(STRIP)
             .map(|strip| {
                 let mut sums = Self::zero();
-                strip.iter().filter_map(|c| at.linearise(c)).for_each(|row| sums.add(&row, weighing, equations));
+                strip
+                    .iter()
+                    .filter_map(|c| at.linearise(c))
+                    .for_each(|row| sums.add(&row, weighing, equations));
                 sums
             })
             .collect();
@@ -281,8 +323,10 @@ impl Sums {
         self.information += weight * (outer - noise) - shared;
         self.bread += slope * (outer - noise) - shared;
         self.noise += weight * noise;
-        let noise = triangle(|i, j| weight * noise[(i, j)]);
-        self.noise_square.ger(1.0, &noise, &noise, 1.0);
+        if self.used.is_multiple_of(SAMPLED) {
+            let noise = triangle(|i, j| weight * noise[(i, j)]);
+            self.noise_square.ger(SAMPLED as f64, &noise, &noise, 1.0);
+        }
         self.square += weight * row.standard * row.standard;
         self.used += 1;
         self.inliers += usize::from(q <= INLIER_Q);
@@ -336,7 +380,8 @@ impl<'a> Search<'a> {
                 // Far from the end the residuals are motion as well as noise, of which too much would be taken away.
                 self.scale2 = self.scale2.min(self.kernel.gaussian_scale2());
             }
-            let sums = Sums::over(self.changes, &self.at(), &Weighing::new(self.kernel, self.scale2), equations);
+            let sums =
+                Sums::over(self.changes, &self.at(), &Weighing::new(self.kernel, self.scale2), equations);
             if sums.used < 6 {
                 return Err(Unsolvable::FewRows { rows: sums.used, needed: 6 });
             }
@@ -358,12 +403,17 @@ impl<'a> Search<'a> {
 
 /// A robust first scale of e²/V: its median over that of χ²₁.
 fn first_scale2(changes: &[DisparityChange], at: &At<'_>, kernel: &StudentT) -> f64 {
-    let mut squares: Vec<f64> = changes.iter().filter_map(|c| Some(at.linearise(c)?.standard.powi(2))).collect();
-    if squares.is_empty() { 1.0 } else { (kernel.gaussian_scale2() * median(&mut squares) / 0.455).max(LEAST_SCALE2) }
+    let mut squares: Vec<f64> =
+        changes.iter().filter_map(|c| Some(at.linearise(c)?.standard.powi(2))).collect();
+    if squares.is_empty() {
+        1.0
+    } else {
+        (kernel.gaussian_scale2() * median(&mut squares) / 0.455).max(LEAST_SCALE2)
+    }
 }
 
 /// A direction is determined whose information exceeds so many standard errors of its correction.
-const CERTAIN: f64 = 2.0;
+const CERTAIN: f64 = 2.5;
 
 /// How much the squares of neighbouring rows' noise add to the scatter of the correction: at most half again as much,
 /// since central differences two pixels apart are correlated by −½.
@@ -459,7 +509,8 @@ impl Answer<'_> {
         for (place, score) in places.iter().enumerate().filter_map(|(i, s)| Some((i, s.as_ref()?))) {
             for (right, down) in SHARING {
                 let u = (place % width) as isize + right;
-                let other = (0..width as isize).contains(&u).then(|| place as isize + right + down * width as isize);
+                let other =
+                    (0..width as isize).contains(&u).then(|| place as isize + right + down * width as isize);
                 if let Some(Some(other)) = other.and_then(|i| places.get(usize::try_from(i).ok()?)) {
                     pairs += score * other.transpose();
                 }

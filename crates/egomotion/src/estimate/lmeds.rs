@@ -106,7 +106,8 @@ pub fn refit<const N: usize>(
     found: &Search<N>,
     options: &LmedsOptions,
 ) -> Result<Fit<N>, Unsolvable> {
-    let refitting = Refitting { rows, weighting, options, rounded: options.reweights > 1 && are_rounded(rows) };
+    let refitting =
+        Refitting { rows, weighting, options, rounded: options.reweights > 1 && are_rounded(rows) };
     let first = refitting.settle(&found.theta, found.median_square);
     if !refitting.rounded {
         return first;

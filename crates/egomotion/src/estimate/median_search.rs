@@ -40,7 +40,8 @@ pub fn search<const N: usize>(
     while let Some((candidate, rest)) = left.split_first() {
         left = rest;
         let limit = best.map_or(f64::INFINITY, |(b, _)| b.median_square);
-        let Some(median_square) = median_within(rows, weighting, &candidate.theta, limit, &mut squares) else {
+        let Some(median_square) = median_within(rows, weighting, &candidate.theta, limit, &mut squares)
+        else {
             continue;
         };
         let better = best.is_none_or(|(b, index)| {
@@ -93,10 +94,7 @@ struct Candidate<const N: usize> {
 }
 
 /// The candidates of the subsets; of those that propose the same, as all do that fit nothing but zeros, the first.
-fn distinct<const N: usize>(
-    rows: &[Row<N>],
-    subsets: impl Iterator<Item = [usize; N]>,
-) -> Vec<Candidate<N>> {
+fn distinct<const N: usize>(rows: &[Row<N>], subsets: impl Iterator<Item = [usize; N]>) -> Vec<Candidate<N>> {
     let mut candidates: Vec<Candidate<N>> = subsets
         .enumerate()
         .filter_map(|(index, subset)| Some(Candidate { theta: exact_fit(rows, &subset)?, index }))
@@ -178,7 +176,10 @@ const TOGETHER: usize = 36;
 
 impl<const N: usize> Columns<N> {
     fn of(rows: &[Row<N>], weighting: Weighting) -> Self {
-        Self { chunks: rows.par_chunks(CHUNK).map(|rows| Chunk::of(rows, weighting)).collect(), rows: rows.len() }
+        Self {
+            chunks: rows.par_chunks(CHUNK).map(|rows| Chunk::of(rows, weighting)).collect(),
+            rows: rows.len(),
+        }
     }
 
     /// Those of the candidates of which it is not certain that their median exceeds `median_square`.
@@ -302,7 +303,10 @@ mod tests {
             // In any order: what is best does not depend on what is met first, but for ties.
             let mut turned: Vec<[usize; N]> = all().collect();
             turned.reverse();
-            assert_eq!(search(rows, weighting, turned.iter().copied()), plain_search(rows, weighting, turned.into_iter()));
+            assert_eq!(
+                search(rows, weighting, turned.iter().copied()),
+                plain_search(rows, weighting, turned.into_iter())
+            );
         }
     }
 

@@ -68,7 +68,8 @@ impl<const N: usize> NormalEquations<N> {
     pub fn weighted(rows: &[Row<N>], weights: &[f64]) -> Self {
         const STRIP: usize = 16_384;
         let strips = rows.par_chunks(STRIP).zip(weights.par_chunks(STRIP));
-        let parts: Vec<Self> = strips.map(|(rows, w)| Self::over(rows.iter().zip(w.iter().copied()))).collect();
+        let parts: Vec<Self> =
+            strips.map(|(rows, w)| Self::over(rows.iter().zip(w.iter().copied()))).collect();
         parts.iter().fold(Self::default(), |sum, part| Self {
             information: sum.information + part.information,
             moment: sum.moment + part.moment,

@@ -43,7 +43,8 @@ impl<const N: usize> Undetermined<N> {
     pub fn include(&mut self, direction: &SVector<f64, N>) {
         let Some(direction) = direction.try_normalize(0.0) else { return };
         // Once more takes away what rounding left.
-        let rest = |v: SVector<f64, N>| self.directions().iter().fold(v, |v, known| v - known * known.dot(&v));
+        let rest =
+            |v: SVector<f64, N>| self.directions().iter().fold(v, |v, known| v - known * known.dot(&v));
         let rest = rest(rest(direction));
         if self.count < N && rest.norm() > 1e-9 {
             self.directions[self.count] = rest.normalize();
@@ -54,7 +55,9 @@ impl<const N: usize> Undetermined<N> {
     /// The same with components of which nothing is known.
     #[must_use]
     pub fn with_components(mut self, components: impl IntoIterator<Item = usize>) -> Self {
-        components.into_iter().for_each(|i| self.include(&SVector::from_fn(|j, _| f64::from(u8::from(i == j)))));
+        components
+            .into_iter()
+            .for_each(|i| self.include(&SVector::from_fn(|j, _| f64::from(u8::from(i == j)))));
         self
     }
 }
@@ -94,10 +97,14 @@ impl Undetermined<6> {
 
     /// A readable basis: pure shifts first, then turns, then screws.
     pub fn motions(&self) -> Vec<FreeMotion> {
+        if self.count == 0 {
+            return Vec::new();
+        }
         let basis = DMatrix::from_fn(6, self.count, |i, k| self.directions[k][i]);
         let turning = basis.rows(3, 3).into_owned();
         let eigen = (turning.transpose() * &turning).symmetric_eigen();
-        let combined = |k: usize| Vector6::from_iterator((&basis * eigen.eigenvectors.column(k)).iter().copied());
+        let combined =
+            |k: usize| Vector6::from_iterator((&basis * eigen.eigenvectors.column(k)).iter().copied());
         let (mut shifts, mut turns) = (Vec::new(), Vec::new());
         for k in 0..self.count {
             let motion = combined(k);
@@ -138,7 +145,8 @@ fn part<const FROM: usize>(motion: &Vector6<f64>) -> Vector3<f64> {
 fn reduced(mut motions: Vec<Vector6<f64>>, first: usize, tolerance: f64) -> Vec<Vector6<f64>> {
     let mut done = 0;
     for column in first..first + 3 {
-        let pivot = (done..motions.len()).max_by(|&a, &b| motions[a][column].abs().total_cmp(&motions[b][column].abs()));
+        let pivot = (done..motions.len())
+            .max_by(|&a, &b| motions[a][column].abs().total_cmp(&motions[b][column].abs()));
         let Some(pivot) = pivot.filter(|&p| motions[p][column].abs() > tolerance) else { continue };
         motions.swap(done, pivot);
         let unit = motions[done] / motions[done][column];
@@ -187,7 +195,8 @@ fn direction(v: &Vector3<f64>) -> String {
 impl fmt::Display for FreeMotion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let axis = |about: &Vector3<f64>, through: &Vector3<f64>| {
-            let place = if through.amax() < 5e-3 { String::new() } else { format!(" through {} m", triple(through)) };
+            let place =
+                if through.amax() < 5e-3 { String::new() } else { format!(" through {} m", triple(through)) };
             format!("turn about {}{place}", direction(about))
         };
         match self {
@@ -225,7 +234,11 @@ mod tests {
     fn words(directions: &[Vector6<f64>]) -> String {
         // Mixed with each other, as eigenvectors come.
         let mix = |k: usize| {
-            directions.iter().enumerate().map(|(i, d)| d * (1.0 + ((i + 2) * (k + 1)) as f64).sin()).sum::<Vector6<f64>>()
+            directions
+                .iter()
+                .enumerate()
+                .map(|(i, d)| d * (1.0 + ((i + 2) * (k + 1)) as f64).sin())
+                .sum::<Vector6<f64>>()
         };
         Undetermined::spanned((0..directions.len()).map(mix), 1e-3).to_string()
     }
@@ -235,9 +248,11 @@ mod tests {
         assert_eq!(words(&[]), "");
         assert_eq!(words(&[shift([0.0, -2.0, 0.0])]), "shift along y");
         assert_eq!(words(&[shift([1.0, 0.0, 1.0])]), "shift along (0.71, 0, 0.71)");
-        let wall = [shift([1.0, 0.0, 0.0]), shift([0.0, 1.0, 0.0]), turn([0.0, 0.0, 1.0], [0.3, 0.2, 3.0], 0.0)];
+        let wall =
+            [shift([1.0, 0.0, 0.0]), shift([0.0, 1.0, 0.0]), turn([0.0, 0.0, 1.0], [0.3, 0.2, 3.0], 0.0)];
         assert_eq!(words(&wall), "shift along x; shift along y; turn about z");
-        let ball = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turn(axis, [0.1, -0.2, 3.0], 0.0));
+        let ball =
+            [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turn(axis, [0.1, -0.2, 3.0], 0.0));
         assert_eq!(
             words(&ball),
             "turn about x through (0, -0.2, 3) m; turn about y through (0.1, 0, 3) m; turn about z through (0.1, -0.2, 0) m"
@@ -253,7 +268,11 @@ mod tests {
 
     #[test]
     fn the_named_motions_span_what_is_undetermined() {
-        let given = [turn([1.0, 2.0, -0.5], [0.3, -1.0, 2.0], 0.4), turn([0.0, 1.0, 1.0], [1.0, 0.0, 2.0], 0.0), shift([0.2, 0.1, 1.0])];
+        let given = [
+            turn([1.0, 2.0, -0.5], [0.3, -1.0, 2.0], 0.4),
+            turn([0.0, 1.0, 1.0], [1.0, 0.0, 2.0], 0.0),
+            shift([0.2, 0.1, 1.0]),
+        ];
         let undetermined = Undetermined::spanned(given, 1e-3);
         let motions = undetermined.motions();
         assert_eq!(motions.len(), 3);

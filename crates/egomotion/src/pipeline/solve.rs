@@ -2,8 +2,8 @@
 
 use super::config::{Approach, Config, EstimatorKind, Method};
 use crate::constrain::{binocular_flow, dcce, image_flow};
-use crate::estimate::errors_in_variables::{self, errors_in_variables};
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
+use crate::estimate::errors_in_variables::{self, errors_in_variables};
 use crate::estimate::least_squares::{Weighting, least_squares};
 use crate::estimate::lmeds::{LmedsOptions, lmeds};
 use crate::estimate::m_estimator::m_estimate;
@@ -197,7 +197,9 @@ impl<'a> Solver<'a> {
         let fit = match self.config.estimator {
             EstimatorKind::Ls => least_squares(&rows, Weighting::InverseVariance)?,
             EstimatorKind::Lmeds => lmeds(&rows, Weighting::InverseVariance, &self.lmeds())?,
-            EstimatorKind::Irls | EstimatorKind::Eiv => m_estimate(&rows, &self.start.vector(), &self.config.irls)?,
+            EstimatorKind::Irls | EstimatorKind::Eiv => {
+                m_estimate(&rows, &self.start.vector(), &self.config.irls)?
+            }
         };
         Ok(fit.estimate(&rows))
     }
