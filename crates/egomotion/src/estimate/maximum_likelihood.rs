@@ -229,6 +229,7 @@ fn finish(
         motion: Estimate {
             theta: Gaussian { mean: observability.known(&found.phi.vector()), cov },
             observed: observability.observed(),
+            undetermined: observability.undetermined(),
             rows,
             inliers: whole.inliers,
             residual_scale: (whole.weighted_square / freedom).sqrt(),

@@ -29,6 +29,9 @@ pub fn approach_name(approach: Approach) -> &'static str {
     }
 }
 
+/// Side of the blocks within which rows are correlated, in pixels.
+const STENCIL_BLOCK_PX: f64 = 12.0;
+
 impl Contender {
     /// All that have a meaning in an approach.
     pub fn all(approach: Approach) -> Vec<Self> {
@@ -41,7 +44,8 @@ impl Contender {
         let linear = methods.iter().flat_map(|&method| {
             estimators.into_iter().map(move |estimator| Self { approach, method, estimator })
         });
-        linear.chain([Self { approach, method: M::Ml, estimator: E::Irls }]).collect()
+        let corrected = Self { approach, method: M::Dcce, estimator: E::Eiv };
+        linear.chain([corrected]).chain([Self { approach, method: M::Ml, estimator: E::Irls }]).collect()
     }
 
     /// Name of the method, in files.
@@ -63,6 +67,7 @@ impl Contender {
             (_, EstimatorKind::Ls) => "ls",
             (_, EstimatorKind::Lmeds) => "lmeds",
             (_, EstimatorKind::Irls) => "irls",
+            (_, EstimatorKind::Eiv) => "eiv",
         }
     }
 
@@ -72,6 +77,8 @@ impl Contender {
             method: self.method,
             approach: self.approach,
             estimator: self.estimator,
+            // Pixels share nothing but the stencils of their differences.
+            block_px: STENCIL_BLOCK_PX,
             seed,
             // Points of the synthetic world share no error of a matcher.
             maximum_likelihood: MaximumLikelihoodOptions {

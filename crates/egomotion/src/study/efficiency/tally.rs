@@ -144,6 +144,7 @@ mod tests {
         let estimate = |error: f64| Estimate {
             theta: Gaussian { mean: Vector6::from_element(error), cov: Matrix6::identity() },
             observed: [true; 6],
+            undetermined: crate::estimate::Undetermined::default(),
             rows: 9,
             inliers: 9,
             residual_scale: 1.0,
