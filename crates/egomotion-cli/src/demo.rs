@@ -21,7 +21,7 @@ use crate::summary::Summary;
 use crate::terminal;
 
 /// Rays along each side of a pixel that shows an edge.
-const SAMPLES: usize = 2;
+const SAMPLES: usize = 3;
 /// Seed of the cameras' noise.
 const NOISE_SEED: u64 = 2003;
 

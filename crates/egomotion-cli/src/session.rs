@@ -105,6 +105,12 @@ impl Session<'_> {
                 {
                     self.progress.suspend(|| tell(format_args!("frame {index}: {why}")));
                 }
+                if let Ok(estimate) = &motion.motion
+                    && !estimate.is_complete()
+                {
+                    let free = &estimate.undetermined;
+                    self.progress.suspend(|| tell(format_args!("frame {index}: not determined: {free}")));
+                }
                 tally.add(decode_ms, &motion.stages);
                 trajectory.push(&motion);
                 let frame = motion.frame;

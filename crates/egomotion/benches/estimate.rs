@@ -1,10 +1,14 @@
 //! From dense fields to motion and maps on one street pair: `cargo bench -p egomotion --bench estimate`.
 //!
-//! Needs real images: KITTI odometry sequence 06 under `EGOMOTION_DATA` or `../shared/data`.
+//! Least median of squares is timed on rows made at random; the rest
+//! needs real images: KITTI odometry sequence 06 under `EGOMOTION_DATA` or `../shared/data`.
 
 mod street;
 
 use criterion::Criterion;
+use egomotion::estimate::Row;
+use egomotion::estimate::least_squares::Weighting;
+use egomotion::estimate::lmeds::{LmedsOptions, lmeds, plain_search, random_subsets, search, trials};
 use egomotion::estimate::systematic::common_errors;
 use egomotion::geometry::Twist;
 use egomotion::motion::depth_velocity::{DisparityOffset, RigidPrediction};
@@ -13,6 +17,9 @@ use egomotion::observe::{DensePair, DisparityMatcher, StereoPyramid, dense_flow}
 use egomotion::pipeline::Config;
 use egomotion::pipeline::maps::motion_maps;
 use egomotion::pipeline::solve::{Observed, solve};
+use nalgebra::Vector6;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 
 fn estimation(c: &mut Criterion) {
     let Some((images, rig)) = street::two_frames(4) else { return };
@@ -44,8 +51,37 @@ fn estimation(c: &mut Criterion) {
     c.bench_function("maps", |b| b.iter(|| motion_maps(&pair, Some(&rigid), None, &config, 0.1)));
 }
 
+/// Equations in six unknowns, a share of them outliers.
+fn random_rows(count: usize, outliers: f64) -> Vec<Row<6>> {
+    let mut rng = Pcg64Mcg::seed_from_u64(58);
+    let truth = Vector6::new(0.01, -0.01, -0.015, 0.002, 0.002, 0.001);
+    let row = |block| {
+        let a = Vector6::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        let noise: f64 = (0..12).map(|_| rng.random_range(-0.5..0.5)).sum();
+        let far = if rng.random_bool(outliers) { rng.random_range(-0.1..0.1) } else { 0.0 };
+        Row { a, b: a.dot(&truth) + 0.002 * noise + far, sigma: 0.002, block }
+    };
+    (0..count).map(row).collect()
+}
+
+/// 300,000 rows, P = .99, ε = .5: 293 subsets of six.
+fn least_median(c: &mut Criterion) {
+    let options = LmedsOptions::default();
+    for outliers in [0.0, 0.4] {
+        let rows = random_rows(300_000, outliers);
+        let count = trials(options.confidence, options.outliers, 6);
+        let subsets = || random_subsets::<6>(rows.len(), count, options.seed);
+        let found = search(&rows, Weighting::Unit, subsets());
+        assert_eq!(found, plain_search(&rows, Weighting::Unit, subsets()));
+        let name = |what: &str| format!("LMedS, {what}, {:.0} % outliers", 100.0 * outliers);
+        c.bench_function(&name("search"), |b| b.iter(|| search(&rows, Weighting::Unit, subsets())));
+        c.bench_function(&name("search and refit"), |b| b.iter(|| lmeds(&rows, Weighting::Unit, &options)));
+    }
+}
+
 fn main() {
     let mut criterion = Criterion::default().sample_size(30).configure_from_args();
+    least_median(&mut criterion);
     estimation(&mut criterion);
     criterion.final_summary();
 }

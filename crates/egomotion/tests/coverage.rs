@@ -24,7 +24,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use scattered::{correlated, normals, phi, places, random, rig, stereo_flow};
 
-const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, iterations: 100, tolerance: 1e-6 };
+const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, fitted: false, iterations: 100, tolerance: 1e-6 };
 
 /// Blocks of 32 px over 320×240: 10 × 8.
 const BLOCKS: f64 = 80.0;
@@ -289,8 +289,8 @@ fn scale_of_least_median_of_squares() {
     println!("scale from the median: {mean:.4} ± {error:.4} σ");
     assert!((mean - 1.0).abs() < 4.0 * error, "{mean} ± {error}");
 
-    // Of the search: with a share ε of far outliers the median of all is the ½/(1 − ε) quantile of the good ones,
-    // and the best of m subsets of three is off by a share of σ, which adds to the residuals, less with more subsets.
+    // Of the whole: with a share ε of far outliers the median of all is the ½/(1 − ε) quantile of the good ones.
+    // The best of m subsets of three is off by a share of σ, which the refits make good, however few there were.
     for (outliers, inflation) in [(0.0, 1.0), (0.2, 1.318), (0.4, 2.051)] {
         let truth = Vector3::new(0.5, -1.0, 2.0);
         let (mut sums, repeats) = ([0.0; 2], 20);
@@ -311,7 +311,8 @@ fn scale_of_least_median_of_squares() {
         println!(
             "scale of the search with {outliers} outliers: {few:.3}, of more subsets {many:.3} of the truth's"
         );
-        assert!(many < few && many > 0.97 && many < 1.1, "{outliers}: {few} {many}");
+        assert!(few > 0.97 && few < 1.05, "{outliers}: {few}");
+        assert!((many - few).abs() < 0.01, "{outliers}: {few} {many}");
     }
 }
 

@@ -383,7 +383,7 @@ fn lmeds_exhaustive() {
 fn fused() {
     let all = vectors();
     let rig = rig(&all);
-    let exact = StudentT { nu: f64::INFINITY, iterations: 100, tolerance: 1e-12 };
+    let exact = StudentT { nu: f64::INFINITY, fitted: false, iterations: 100, tolerance: 1e-12 };
     for case in all["fused"].as_array().unwrap() {
         let ends = |k: &str, sigma: &str| -> Vec<Gaussian<3>> {
             let variances = list(&case[sigma]).iter().map(|s| s * s).collect::<Vec<_>>();

@@ -445,7 +445,7 @@ fn profiled<const M: usize, const S: usize>(
     cost(&s)
 }
 
-const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, iterations: 200, tolerance: 1e-10 };
+const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, fitted: false, iterations: 200, tolerance: 1e-10 };
 
 /// The estimate is a stationary point of the profiled cost, and its covariance the inverse of half the Hessian.
 ///

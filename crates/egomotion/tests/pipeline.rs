@@ -223,6 +223,7 @@ fn answer(
         motion: motion.map(|phi| Estimate {
             theta: Gaussian { mean: phi.vector(), cov: Matrix6::identity() },
             observed: [true; 6],
+            undetermined: Default::default(),
             rows: 100,
             inliers: 90,
             residual_scale: 1.0,

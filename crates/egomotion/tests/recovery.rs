@@ -84,7 +84,7 @@ fn linear<const N: usize>(name: &str, rows: &[Row<N>]) -> Result<Fit<N>, Unsolva
 
 const LINEAR: [&str; 4] = ["ls", "wls", "lmeds", "irls"];
 
-const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, iterations: 100, tolerance: 1e-9 };
+const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, fitted: false, iterations: 100, tolerance: 1e-9 };
 
 /// Motions from none to 20 pixels of flow.
 fn motions() -> [Twist; 4] {

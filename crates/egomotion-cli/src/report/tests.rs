@@ -1,6 +1,6 @@
 //! The page as a whole: nothing in the input can break it or make it load anything.
 
-use egomotion::estimate::MotionEstimate;
+use egomotion::estimate::{MotionEstimate, Undetermined};
 use egomotion::geometry::{Field, Gaussian, Grid, Image, RigidMotion, StereoRig, Twist};
 use egomotion::motion::{NoObstacle, TimeToImpact};
 use egomotion::observe::{DisparityMap, FlowField};
@@ -22,7 +22,8 @@ pub struct Run {
 /// φ with all components observed, each with the variance `variance`.
 pub fn motion(phi: &Vector6<f64>, variance: f64) -> MotionEstimate {
     let theta = Gaussian { mean: *phi, cov: Matrix6::from_diagonal_element(variance) };
-    MotionEstimate { theta, observed: [true; 6], rows: 900, inliers: 800, residual_scale: 1.0 }
+    let undetermined = Undetermined::default();
+    MotionEstimate { theta, observed: [true; 6], undetermined, rows: 900, inliers: 800, residual_scale: 1.0 }
 }
 
 impl Run {

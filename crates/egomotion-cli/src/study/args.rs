@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 
+use egomotion::pipeline::Method;
 use egomotion::sim::Sequence;
 
-use crate::args::{positive, size};
+use crate::args::{MethodArg, positive, size};
 
 /// The studies.
 #[derive(Debug, Subcommand)]
@@ -26,6 +27,9 @@ pub enum StudyCommand {
     Assumptions(LaboratoryArgs),
     /// Whether the stated uncertainty is true: the whole image pipeline on random pairs of rendered frames.
     Consistency(ConsistencyArgs),
+    /// Variance over the Cramér–Rao bound, bias, NEES and coverage of every method, over noise, number of points and
+    /// outliers; what is reported observed where something is missing.
+    Efficiency(EfficiencyArgs),
     /// Every study, with one page that links them.
     All(LaboratoryArgs),
 }
@@ -111,6 +115,26 @@ impl SensitivityArgs {
 /// The paper's sequences.
 const SEQUENCES: [&str; 3] = ["A", "B", "C"];
 
+/// How near the bound.
+#[derive(Debug, Clone, Args)]
+pub struct EfficiencyArgs {
+    /// The sequences: A, B and C in full, lab-A … lab-M at fewer settings [default: all].
+    #[arg(long = "sequence", value_name = "NAME,…", value_delimiter = ',', value_parser = any_sequence)]
+    pub sequences: Option<Vec<String>>,
+    /// The methods, each with all its estimators [default: all].
+    #[arg(long = "method", value_name = "NAME,…", value_delimiter = ',')]
+    methods: Option<Vec<MethodArg>>,
+    #[command(flatten)]
+    pub laboratory: LaboratoryArgs,
+}
+
+impl EfficiencyArgs {
+    /// The methods that were asked for.
+    pub fn methods(&self) -> Option<Vec<Method>> {
+        Some(self.methods.as_ref()?.iter().map(|&method| method.into()).collect())
+    }
+}
+
 /// Section 7.2 on images.
 #[derive(Debug, Clone, Args)]
 pub struct RealArgs {
@@ -194,6 +218,10 @@ fn any_name(text: &str) -> Result<String, String> {
     known.map(str::to_owned).ok_or_else(|| format!("must be of {}", all()))
 }
 
+fn any_sequence(text: &str) -> Result<String, String> {
+    sequence(text).or_else(|_| lab_name(text)).map_err(|_| "there are A, B, C and lab-A to lab-M".into())
+}
+
 fn above_zero(text: &str) -> Result<f64, String> {
     number(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err("must be above 0".into()) })
 }
@@ -256,6 +284,25 @@ mod tests {
         assert_eq!(typed("--sequence A --round 0").unwrap().round, Levels(None));
         assert_eq!(args.laboratory.folder(Some("table")), Path::new("egomotion-out/study-table"));
         assert_eq!(args.laboratory.folder(None), Path::new("egomotion-out/study"));
+    }
+
+    #[derive(Debug, Parser)]
+    struct TypedEfficiency {
+        #[command(flatten)]
+        efficiency: EfficiencyArgs,
+    }
+
+    #[test]
+    fn methods_are_named_as_in_a_run() {
+        let typed = |words: &[&str]| {
+            TypedEfficiency::try_parse_from([&["efficiency"], words].concat()).map(|t| t.efficiency)
+        };
+        let args = typed(&["--sequence", "c,LAB-a", "--method", "ml,dcce"]).unwrap();
+        assert_eq!(args.sequences.as_deref().unwrap(), ["C", "lab-A"]);
+        assert_eq!(args.methods().unwrap(), [Method::Ml, Method::Dcce]);
+        assert!(typed(&[]).unwrap().methods().is_none());
+        assert_eq!(typed(&["--sequence", "D"]).unwrap_err().exit_code(), 2);
+        assert_eq!(typed(&["--method", "mle"]).unwrap_err().exit_code(), 2);
     }
 
     #[test]

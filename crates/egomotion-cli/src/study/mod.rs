@@ -18,6 +18,7 @@ use egomotion::pipeline::Observe;
 use egomotion::study::assumptions::Assumptions;
 use egomotion::study::consistency::Consistency;
 use egomotion::study::draw::Measuring;
+use egomotion::study::efficiency::Efficiency;
 use egomotion::study::real::LabStudy;
 use egomotion::study::sensitivity::{OneSetting, Sensitivity};
 use egomotion::study::uncertainty::Uncertainty;
@@ -26,7 +27,7 @@ use crate::run::set_threads;
 use crate::{Ending, terminal};
 
 pub use args::StudyCommand;
-use args::{ConsistencyArgs, LaboratoryArgs, TableArgs};
+use args::{ConsistencyArgs, EfficiencyArgs, LaboratoryArgs, TableArgs};
 use laboratory::{Laboratory, Options};
 
 /// Run what was asked for.
@@ -40,6 +41,7 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
         StudyCommand::Real(args) => real::run(args),
         StudyCommand::Assumptions(args) => alone(args, &Assumptions { seed: args.seed }),
         StudyCommand::Consistency(args) => alone(&args.laboratory, &consistency(args)),
+        StudyCommand::Efficiency(args) => alone(&args.laboratory, &efficiency(args)),
         StudyCommand::All(args) => {
             let mut laboratory = open(args, None, Some("The paper's studies, repeated"))?;
             // Its draws are of another kind and number.
@@ -48,6 +50,7 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
             // As many textures as it has by itself.
             laboratory.run(&LabStudy { first_seed: args.seed, ..LabStudy::default() })?;
             laboratory.run(&Assumptions { seed: args.seed })?;
+            laboratory.run(&Efficiency { seed: args.seed, ..Efficiency::default() })?;
             laboratory.close()
         }
     }
@@ -87,6 +90,16 @@ fn consistency(args: &ConsistencyArgs) -> Consistency {
         height_px: args.size.1,
         observe: if args.sparse { Observe::Sparse } else { Observe::Dense },
         pairs: args.laboratory.draws.unwrap_or(own.pairs),
+        seed: args.laboratory.seed,
+    }
+}
+
+fn efficiency(args: &EfficiencyArgs) -> Efficiency {
+    let own = Efficiency::default();
+    Efficiency {
+        sequences: args.sequences.clone().unwrap_or(own.sequences),
+        methods: args.methods().unwrap_or(own.methods),
+        draws: args.laboratory.draws.unwrap_or(own.draws),
         seed: args.laboratory.seed,
     }
 }

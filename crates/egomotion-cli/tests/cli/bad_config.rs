@@ -52,6 +52,8 @@ fn combinations_without_meaning_are_refused_with_the_reason() {
     let out = folder.path().join("out");
     for (options, reason) in [
         ("--method ml --estimator ls", "use estimator irls"),
+        ("--method joint --estimator eiv", "use method dcce"),
+        ("--estimator eiv", "use method dcce"),
         ("--estimator lmeds", "use estimator irls"),
         ("--method rigid --approach differential", "use approach discrete"),
         ("--method linear22 --approach differential", "use approach discrete"),

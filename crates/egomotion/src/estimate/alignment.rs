@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::lmeds::{LmedsOptions, robust_scale, trials};
 use super::m_estimator::{LEAST_SCALE2, StudentT};
-use super::{Estimate, MotionEstimate, Unsolvable, blocks, median};
+use super::{Estimate, MotionEstimate, Undetermined, Unsolvable, blocks, median};
 use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
 use crate::observe::StereoTrack;
 
@@ -187,6 +187,7 @@ pub fn align(pairs: &[PointPair], form: Form, fitting: &Fitting) -> Result<Motio
     Ok(Estimate {
         theta: Gaussian { mean, cov: leave_one_out(pairs, &weights, form, &whole, &stretch) },
         observed: [true; 6],
+        undetermined: Undetermined::default(),
         rows: pairs.len(),
         inliers: match fitting {
             Fitting::MEstimator(_) => {

@@ -11,6 +11,10 @@ use super::{Fit, NormalEquations, Row, Unsolvable, median};
 pub struct StudentT {
     /// Degrees of freedom ν; small is heavy-tailed, infinite is Gaussian.
     pub nu: f64,
+    /// Whether maximum likelihood finds ν, and a share of outliers, from the residuals; see [`super::mixture`].
+    ///
+    /// Linear rows keep `nu`, and so does the Gaussian.
+    pub fitted: bool,
     /// Most iterations.
     pub iterations: usize,
     /// The iteration ends when no unknown moves by more than this share of its standard deviation.
@@ -19,7 +23,7 @@ pub struct StudentT {
 
 impl Default for StudentT {
     fn default() -> Self {
-        Self { nu: 4.0, iterations: 50, tolerance: 1e-3 }
+        Self { nu: 4.0, fitted: true, iterations: 50, tolerance: 1e-3 }
     }
 }
 
@@ -27,6 +31,19 @@ impl StudentT {
     /// Weight of a residual of `dimension` components whose squared Mahalanobis length is `q`.
     pub fn weight(&self, q: f64, dimension: f64) -> f64 {
         if self.nu.is_infinite() { 1.0 } else { (self.nu + dimension) / (self.nu + q) }
+    }
+
+    /// Squared scale to which normal residuals of variance 1 lead: E\[w(z²/s²) z²\] = s².
+    pub fn gaussian_scale2(&self) -> f64 {
+        // The trapezoid rule is exact to rounding for what decays so fast.
+        let moment = |s2: f64| {
+            let at = |i: i32| {
+                let z2 = (0.05 * f64::from(i)).powi(2);
+                self.weight(z2 / s2, 1.0) * z2 * (-0.5 * z2).exp()
+            };
+            0.05 * (-200..=200).map(at).sum::<f64>() / std::f64::consts::TAU.sqrt()
+        };
+        (0..60).fold(1.0, |s2, _| moment(s2))
     }
 
     /// −2 ∂weight/∂q, which turns the weighted information into the score's true derivative.

@@ -4,7 +4,8 @@
 //! With e their misclosure linearised at the current structure, S its covariance and G its
 //! derivative by φ, Gauss–Newton solves Σ Gᵀ S⁻¹ G δ = Σ Gᵀ S⁻¹ e; a zero variance before the
 //! motion is legal because S, never the measurement's covariance alone, is inverted. Robust
-//! weights are those of Student's t on q = eᵀ S⁻¹ e.
+//! weights are functions of q = eᵀ S⁻¹ e: those of Student's t beside a share of outliers, both as the
+//! residuals have them ([`super::mixture`]).
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
@@ -15,6 +16,7 @@ use super::blocks::{self, BlockScore, Blocks};
 use super::lmeds::{random_subsets, trials};
 use super::m_estimator::{LEAST_SCALE2, StudentT};
 use super::measurement::{At, Measurement};
+use super::mixture::{MEDIAN, Mixture};
 use super::step::{Step, Sums, Weighing};
 use super::systematic::CommonErrors;
 use super::{Estimate, MotionEstimate, Observability, Unsolvable, median};
@@ -25,7 +27,7 @@ use crate::observe::StereoTrack;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MaximumLikelihoodOptions {
-    /// Distribution of the residuals; `nu` infinite is the Gaussian.
+    /// Distribution of the residuals: found from them, or Student's t; `nu` infinite is the Gaussian.
     pub kernel: StudentT,
     /// Largest share of outliers that the robust start provides for.
     pub outliers: f64,
@@ -66,7 +68,8 @@ pub struct MaximumLikelihood {
 /// Maximise the likelihood from a start.
 ///
 /// With `blocks` the covariance is block-wise, without them it is the model's: the inverse
-/// Gauss–Newton information with the structure eliminated, at the estimated structure.
+/// Gauss–Newton information with the structure eliminated, at the estimated structure, with a robust kernel
+/// times what its scale and weights make of independent residuals.
 ///
 /// # Errors
 /// [`Unsolvable`] with fewer than three usable observations, without any determined direction, or
@@ -78,44 +81,63 @@ pub fn maximum_likelihood<M: Measurement>(
     blocks: Option<&Blocks>,
     kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
-    let mut search = Search { phi: *start, scale2: 1.0 };
+    let mut search = Search::begin(observations, rig, start, kernel)?;
     let stride = observations.len() / COARSE;
     if stride > 1 {
         let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
-        search.begin(&few, rig, kernel)?;
-        // Few observations may leave open what all determine.
-        search = search.settle(&few, rig, None, kernel).map_or(search, |(found, _)| found);
+        search = search.approach(&few, rig, kernel)?;
     } else {
-        search.begin(observations, rig, kernel)?;
+        search = search.approach(observations, rig, kernel)?;
     }
     let (found, sums) = search.settle(observations, rig, blocks, kernel)?;
-    finish(&found, &sums, observations.len(), blocks)
+    finish(&found, &sums, observations.len(), blocks, kernel)
 }
 
 /// About so many observations bring the iteration near its end before all of them are used.
 const COARSE: usize = 4096;
+/// How near, as a share of the standard deviation, is near enough to look at the residuals again,
+const ROUGH: f64 = 0.3;
+/// which is done so often.
+const LOOKS: usize = 2;
 
 /// Where the iteration is.
 #[derive(Debug, Clone, Copy)]
 struct Search {
     phi: Twist,
-    /// Squared scale of the misclosures in units of their stated covariance.
+    /// What the misclosures look like in units of their stated covariance, times the squared scale.
+    mixture: Mixture,
     scale2: f64,
 }
 
 impl Search {
-    /// A robust first scale.
+    /// Residuals as they are at a motion.
     fn begin<M: Measurement>(
-        &mut self,
+        observations: &[M],
+        rig: &StereoRig,
+        phi: &Twist,
+        kernel: &StudentT,
+    ) -> Result<Self, Unsolvable> {
+        let stride = observations.len().div_ceil(COARSE).max(1);
+        let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
+        let (mixture, scale2) = Mixture::of(kernel, &mut squares(&few, &At::new(*phi, rig)))
+            .ok_or(Unsolvable::FewRows { rows: 0, needed: 3 })?;
+        Ok(Self { phi: *phi, mixture, scale2 })
+    }
+
+    /// Near the end: what residuals look like far from it is not what they look like there.
+    fn approach<M: Measurement>(
+        mut self,
         observations: &[M],
         rig: &StereoRig,
         kernel: &StudentT,
-    ) -> Result<(), Unsolvable> {
-        if kernel.nu.is_finite() {
-            self.scale2 = robust_scale2(observations, &self.phi, rig)
-                .ok_or(Unsolvable::FewRows { rows: 0, needed: 3 })?;
+    ) -> Result<Self, Unsolvable> {
+        let rough = StudentT { tolerance: ROUGH, ..*kernel };
+        for _ in 0..if kernel.nu.is_finite() && kernel.fitted { LOOKS } else { 1 } {
+            // Few observations may leave open what all determine.
+            let Ok((found, _)) = self.settle(observations, rig, None, &rough) else { return Ok(self) };
+            self = Self::begin(observations, rig, &found.phi, kernel)?;
         }
-        Ok(())
+        Ok(self)
     }
 
     /// Iterate until φ moves by less than the tolerance; with the sums of the last step.
@@ -128,15 +150,15 @@ impl Search {
     ) -> Result<(Self, Sums), Unsolvable> {
         let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
         let mut last = 0.0;
-        for _ in 0..kernel.iterations {
+        for iteration in 0..kernel.iterations {
             let at = At::new(self.phi, rig);
-            let weighing = Weighing { blocks, kernel, scale2: self.scale2 };
+            let weighing = Weighing { blocks, mixture: self.mixture, scale2: self.scale2 };
             let sums = Sums::over(observations, &mut structures, &at, &weighing);
             let step = &sums.whole;
             if step.used < 3 {
                 return Err(Unsolvable::FewRows { rows: step.used, needed: 3 });
             }
-            let delta = direction(step)?;
+            let delta = direction(step, iteration < NEWTON)?;
             self.phi = Twist::from_vector(&(self.phi.vector() + delta));
             if kernel.nu.is_finite() {
                 self.scale2 = step.scale2().max(LEAST_SCALE2);
@@ -146,7 +168,8 @@ impl Search {
             let factor = (moved / last).min(0.5);
             let rest = moved * factor / (1.0 - factor);
             last = moved;
-            if rest <= kernel.tolerance * self.scale2.sqrt() {
+            // The first step was one with structures as measured: where it ends depends on their noise.
+            if iteration > 0 && rest <= kernel.tolerance * self.scale2.sqrt() {
                 return Ok((self, sums));
             }
         }
@@ -155,11 +178,11 @@ impl Search {
 }
 
 /// The step of φ: Newton's, with the weights' own change, near the end; Gauss–Newton's elsewhere.
-fn direction(step: &Step) -> Result<Vector6<f64>, Unsolvable> {
+fn direction(step: &Step, newton: bool) -> Result<Vector6<f64>, Unsolvable> {
     let (information, score) = (&step.score.information, &step.score.score);
     let observability = Observability::of(information)?;
     let plain = observability.solve(information, score)?;
-    if observability.rank() < 6 {
+    if observability.rank() < 6 || !newton {
         return Ok(plain);
     }
     let newton = step.bread().cholesky().map(|bread| bread.solve(score));
@@ -168,20 +191,19 @@ fn direction(step: &Step) -> Result<Vector6<f64>, Unsolvable> {
     Ok(newton.filter(|newton| length(newton) <= LONGEST.powi(2) * length(&plain)).unwrap_or(plain))
 }
 
+/// Where Newton's steps do not settle, from so many on only Gauss–Newton's are taken: each of them is one of expectation
+/// and maximisation, by which the likelihood does not fall.
+const NEWTON: usize = 12;
 /// Newton's step is taken unless so many times as long as Gauss–Newton's.
 const LONGEST: f64 = 3.0;
 
-/// A robust first scale of q: its median over that of χ²₃, with the structure as measured.
-pub(super) fn robust_scale2<M: Measurement>(observations: &[M], phi: &Twist, rig: &StereoRig) -> Option<f64> {
-    let at = At::new(*phi, rig);
-    let mut squares: Vec<f64> = observations.iter().filter_map(|o| sampson(o, &at)).collect();
-    (!squares.is_empty()).then(|| (median(&mut squares) / 2.366).max(LEAST_SCALE2))
-}
-
-/// q with the structure held at its measured value (the Sampson form).
-fn sampson<M: Measurement>(observation: &M, at: &At<'_>) -> Option<f64> {
-    let l = observation.linearise(&mut observation.structure(), at)?;
-    Some(l.misclosure.dot(&(l.inverse_cov * l.misclosure)))
+/// q of every observation in front of the camera, with the structure held at its measured value (the Sampson form).
+pub(super) fn squares<M: Measurement>(observations: &[M], at: &At<'_>) -> Vec<f64> {
+    let square = |o: &M| {
+        let l = o.linearise(&mut o.structure(), at)?;
+        Some(l.misclosure.dot(&(l.inverse_cov * l.misclosure)))
+    };
+    observations.iter().filter_map(square).collect()
 }
 
 /// The answer from the sums of the last step, which was less than the tolerance.
@@ -190,6 +212,7 @@ fn finish(
     sums: &Sums,
     rows: usize,
     blocks: Option<&Blocks>,
+    kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
     let whole = &sums.whole;
     let observability = Observability::of(&whole.score.information)?;
@@ -198,13 +221,15 @@ fn finish(
             let scores: Vec<BlockScore<6>> = sums.by_block.iter().map(|step| step.score).collect();
             blocks::covariance(&scores, whole.bread().try_inverse().as_ref(), &observability)
         }
-        None => blocks::model_covariance(1.0, &observability),
+        None if kernel.nu.is_infinite() => blocks::model_covariance(1.0, &observability),
+        None => blocks::model_covariance(whole.spread(), &observability),
     };
     let freedom = (3 * whole.used).saturating_sub(6).max(1) as f64;
     Ok(MaximumLikelihood {
         motion: Estimate {
             theta: Gaussian { mean: observability.known(&found.phi.vector()), cov },
             observed: observability.observed(),
+            undetermined: observability.undetermined(),
             rows,
             inliers: whole.inliers,
             residual_scale: (whole.weighted_square / freedom).sqrt(),
@@ -240,21 +265,68 @@ pub fn robust_start(
     let candidates: Vec<Twist> = candidates.chain(prior.copied()).collect();
     let stride = (sample.len() / FIRST_LOOK).max(1);
     let glance: Vec<StereoTrack> = sample.iter().step_by(stride).copied().collect();
+    let improve = |candidates: Vec<(f64, Twist)>, sample: &[StereoTrack]| -> Vec<Twist> {
+        candidates.par_iter().map(|(_, phi)| concentrated(phi, sample, rig)).collect()
+    };
     let finalists = best(&candidates, FINALISTS, &glance, rig);
-    best(&finalists, 1, &sample, rig).first().copied().ok_or(Unsolvable::Unobservable)
+    if let Some((_, phi)) = finalists.first().filter(|(_, phi)| middle(phi, &sample, rig) < FITS * MEDIAN) {
+        return Ok(*phi);
+    }
+    let finalists = improve(finalists, &glance);
+    let improved = improve(best(&finalists, IMPROVED, &sample, rig), &sample);
+    best(&improved, 1, &sample, rig).first().map(|&(_, phi)| phi).ok_or(Unsolvable::Unobservable)
 }
 
 /// Candidates are first judged on about so many observations,
 const FIRST_LOOK: usize = 100;
-/// and so many of them on all.
-const FINALISTS: usize = 12;
+/// so many of them are improved on these,
+const FINALISTS: usize = 16;
+/// and so many of those on all.
+const IMPROVED: usize = 4;
+/// Steps by which a candidate is improved,
+const CONCENTRATIONS: usize = 4;
+/// by observations whose q, were the median that of χ²₃, is below this: its 95th percentile.
+const NEAR: f64 = 7.8;
+
+/// A motion is no longer improved whose median of q is below so many times that of noise: most of the tracks fit,
+/// as is the rule when it was predicted.
+const FITS: f64 = 1.5;
+
+/// The median of q at a motion.
+fn middle(phi: &Twist, sample: &[StereoTrack], rig: &StereoRig) -> f64 {
+    let middle = median(&mut squares(sample, &At::new(*phi, rig)));
+    if middle.is_nan() { f64::INFINITY } else { middle }
+}
 
 /// The `count` candidates with the least median of q, the best first.
-fn best(candidates: &[Twist], count: usize, sample: &[StereoTrack], rig: &StereoRig) -> Vec<Twist> {
-    let judge = |phi: &Twist| (robust_scale2(sample, phi, rig).unwrap_or(f64::INFINITY), *phi);
-    let mut judged: Vec<(f64, Twist)> = candidates.par_iter().map(judge).collect();
+fn best(candidates: &[Twist], count: usize, sample: &[StereoTrack], rig: &StereoRig) -> Vec<(f64, Twist)> {
+    let mut judged: Vec<(f64, Twist)> =
+        candidates.par_iter().map(|phi| (middle(phi, sample, rig), *phi)).collect();
     judged.sort_by(|a, b| a.0.total_cmp(&b.0));
-    judged.into_iter().take(count).map(|(_, phi)| phi).collect()
+    judged.truncate(count);
+    judged
+}
+
+/// A candidate improved by steps on that part of the sample which it fits best: what it is made
+/// of, three points, is noisy, and then a moving body does not stand out (Rousseeuw and Van Driessen 1999).
+fn concentrated(phi: &Twist, sample: &[StereoTrack], rig: &StereoRig) -> Twist {
+    let mut phi = *phi;
+    for _ in 0..CONCENTRATIONS {
+        let at = At::new(phi, rig);
+        let middle = median(&mut squares(sample, &at));
+        let mut structures: Vec<Vector3<f64>> = sample.iter().map(Measurement::structure).collect();
+        let weighing = Weighing {
+            blocks: None,
+            mixture: Mixture::within(NEAR),
+            scale2: (middle / MEDIAN).max(LEAST_SCALE2),
+        };
+        let step = Sums::over(sample, &mut structures, &at, &weighing).whole;
+        let next = Observability::of(&step.score.information)
+            .and_then(|observability| observability.solve(&step.score.information, &step.score.score));
+        let Ok(delta) = next else { break };
+        phi = Twist::from_vector(&(phi.vector() + delta));
+    }
+    phi
 }
 
 /// The inverse Fisher information of φ at a known motion and structure: no unbiased estimator does better.
@@ -265,12 +337,29 @@ pub fn cramer_rao_bound<M: Measurement>(
     rig: &StereoRig,
     phi: &Twist,
 ) -> Option<Matrix6<f64>> {
-    let at = At::new(*phi, rig);
+    let structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
+    Some(efficient(observations, &structures, rig, phi)?.cov)
+}
+
+/// What no unbiased estimator does better than: one Gauss–Newton step from the true motion and structures.
+///
+/// Its covariance is the Cramér–Rao bound, and its error has exactly that covariance as long as the noise has
+/// the one it states: estimators are compared with it draw by draw. `None` when some direction is not determined.
+pub fn efficient<M: Measurement>(
+    observations: &[M],
+    structures: &[Vector3<f64>],
+    rig: &StereoRig,
+    phi: &Twist,
+) -> Option<Gaussian<6>> {
     let gaussian = StudentT { nu: f64::INFINITY, ..StudentT::default() };
-    let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
-    let weighing = Weighing { blocks: None, kernel: &gaussian, scale2: 1.0 };
-    let sums = Sums::over(observations, &mut structures, &at, &weighing);
-    let observability = Observability::of(&sums.whole.score.information).ok()?;
+    let weighing = Weighing { blocks: None, mixture: Mixture::student(&gaussian), scale2: 1.0 };
+    let sums = Sums::over(observations, &mut structures.to_vec(), &At::new(*phi, rig), &weighing);
+    let BlockScore { information, score } = sums.whole.score;
+    let observability = Observability::of(&information).ok()?;
     let observed: [bool; 6] = observability.observed();
-    observed.iter().all(|&o| o).then(|| blocks::model_covariance(1.0, &observability))
+    let step = observability.solve(&information, &score).ok()?;
+    observed
+        .iter()
+        .all(|&o| o)
+        .then(|| Gaussian { mean: phi.vector() + step, cov: blocks::model_covariance(1.0, &observability) })
 }

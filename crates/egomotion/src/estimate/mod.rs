@@ -2,16 +2,20 @@
 
 pub mod alignment;
 pub mod blocks;
+pub mod errors_in_variables;
 pub mod least_squares;
 pub mod lmeds;
 pub mod m_estimator;
 pub mod maximum_likelihood;
 pub mod measurement;
+pub mod median_search;
+pub mod mixture;
 pub mod observability;
 pub mod row;
 mod step;
 pub mod systematic;
 pub mod two_step;
+pub mod undetermined;
 
 use nalgebra::{SMatrix, SVector};
 use thiserror::Error;
@@ -21,6 +25,7 @@ use crate::geometry::{Gaussian, Twist};
 pub use blocks::Blocks;
 pub use observability::Observability;
 pub use row::{NormalEquations, Row};
+pub use undetermined::{FreeMotion, Undetermined};
 
 /// The answer of an estimator of N unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +34,8 @@ pub struct Estimate<const N: usize> {
     pub theta: Gaussian<N>,
     /// Which components are determined by the data.
     pub observed: [bool; N],
+    /// The directions that are not; for φ, what they are in words.
+    pub undetermined: Undetermined<N>,
     /// Number of rows (or observations) that went in.
     pub rows: usize,
     /// Number of rows that the estimator kept as inliers.
@@ -59,7 +66,10 @@ impl MotionEstimate {
     /// [`Unsolvable::Unobservable`] when none is left.
     pub fn known(mut self) -> Result<Self, Unsolvable> {
         for i in 0..6 {
-            self.observed[i] &= self.theta.cov[(i, i)].is_finite();
+            if self.observed[i] && !self.theta.cov[(i, i)].is_finite() {
+                self.observed[i] = false;
+                self.undetermined = self.undetermined.with_components([i]);
+            }
             if !self.observed[i] {
                 self.theta.mean[i] = 0.0;
             }
@@ -72,7 +82,8 @@ impl MotionEstimate {
     /// The same motion and covariance seen by a parallel camera centred at `centre`, equation (4).
     pub fn seen_from(&self, centre: &nalgebra::Vector3<f64>) -> Self {
         let matrix = Twist::seen_from_matrix(centre);
-        Self { theta: self.theta.propagate(matrix * self.theta.mean, &matrix), ..*self }
+        let theta = self.theta.propagate(matrix * self.theta.mean, &matrix);
+        Self { theta, undetermined: self.undetermined.transformed(&matrix), ..*self }
     }
 }
 
@@ -145,6 +156,7 @@ impl<const N: usize> Fit<N> {
         Estimate {
             theta: Gaussian { mean: self.observability.known(&self.theta), cov },
             observed: self.observability.observed(),
+            undetermined: self.observability.undetermined(),
             rows: rows.len(),
             inliers: self.inliers,
             residual_scale: self.residual_scale,
@@ -161,6 +173,7 @@ mod tests {
         let estimate = |variances: [f64; 6]| Estimate {
             theta: Gaussian::independent([1.0; 6], variances),
             observed: [true; 6],
+            undetermined: Undetermined::default(),
             rows: 10,
             inliers: 10,
             residual_scale: 1.0,

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use super::Unsolvable;
+use super::{Undetermined, Unsolvable};
 
 /// Eigenvalues of the scaled information below this share of the largest count as zero.
 ///
@@ -17,6 +17,9 @@ const NEGLIGIBLE: f64 = 1e-24;
 /// Components with more of themselves than this (squared) in an undetermined direction are unobservable.
 const NULL_SHARE: f64 = 1e-6;
 
+/// The most of [`NULL_SHARE`] where noise makes directions uncertain.
+const MOST_LEAN: f64 = 0.05;
+
 /// The eigen-analysis of a scaled information matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observability {
@@ -26,6 +29,10 @@ pub struct Observability {
     eigenvalues: DVector<f64>,
     /// Eigenvectors, one a column.
     eigenvectors: DMatrix<f64>,
+    /// The eigenvalue that each direction must exceed to be determined.
+    floors: DVector<f64>,
+    /// Components with more of themselves (squared) than this in undetermined directions are unobservable.
+    null_share: f64,
 }
 
 impl Observability {
@@ -46,12 +53,53 @@ impl Observability {
         let scale = DVector::from_iterator(N, diagonal.iter().map(|&v| inverse_root(v)));
         let scaled = DMatrix::from_fn(N, N, |i, j| information[(i, j)] * scale[i] * scale[j]);
         let eigen = scaled.symmetric_eigen();
-        Ok(Self { scale, eigenvalues: eigen.eigenvalues, eigenvectors: eigen.eigenvectors })
+        let floors = DVector::from_element(N, RANK_TOLERANCE * eigen.eigenvalues.max());
+        Ok(Self {
+            scale,
+            eigenvalues: eigen.eigenvalues,
+            eigenvectors: eigen.eigenvectors,
+            floors,
+            null_share: NULL_SHARE,
+        })
+    }
+
+    /// Analyse information from which the share of noise was subtracted.
+    ///
+    /// A direction x is determined only where its information xᵀ A x exceeds `uncertain(x)`: what is less may be what the
+    /// subtraction left. An undetermined direction is then known no better, so that a component is observed
+    /// although it has a little of itself there.
+    ///
+    /// # Errors
+    /// As [`Observability::of`].
+    pub fn beyond_noise<const N: usize>(
+        information: &SMatrix<f64, N, N>,
+        noise: &SMatrix<f64, N, N>,
+        uncertain: impl Fn(&SVector<f64, N>) -> f64,
+    ) -> Result<Self, Unsolvable> {
+        let plain = Self::of(&(information + noise))?;
+        let scale = &plain.scale;
+        let scaled = DMatrix::from_fn(N, N, |i, j| information[(i, j)] * scale[i] * scale[j]);
+        let eigen = scaled.symmetric_eigen();
+        let least = RANK_TOLERANCE * plain.eigenvalues.max();
+        let floors = DVector::from_fn(N, |k, _| {
+            uncertain(&SVector::from_fn(|i, _| eigen.eigenvectors[(i, k)] * scale[i])).max(least)
+        });
+        let mut found = Self {
+            scale: plain.scale,
+            eigenvalues: eigen.eigenvalues,
+            eigenvectors: eigen.eigenvectors,
+            floors,
+            null_share: NULL_SHARE,
+        };
+        // An eigenvector leans towards another by the matrix's error over the difference of their eigenvalues.
+        let weakest = found.determined().map(|k| found.eigenvalues[k]).fold(f64::INFINITY, f64::min);
+        let lean = found.floors.max() / weakest;
+        found.null_share = (lean * lean).clamp(NULL_SHARE, MOST_LEAN);
+        Ok(found)
     }
 
     fn determined(&self) -> impl Iterator<Item = usize> + '_ {
-        let floor = RANK_TOLERANCE * self.eigenvalues.max();
-        (0..self.eigenvalues.len()).filter(move |&k| self.eigenvalues[k] > floor)
+        (0..self.eigenvalues.len()).filter(|&k| self.eigenvalues[k] > self.floors[k])
     }
 
     /// Number of independent directions that are determined.
@@ -64,8 +112,18 @@ impl Observability {
         let kept: Vec<usize> = self.determined().collect();
         std::array::from_fn(|i| {
             let share: f64 = kept.iter().map(|&k| self.eigenvectors[(i, k)].powi(2)).sum();
-            self.scale[i] > 0.0 && 1.0 - share < NULL_SHARE
+            self.scale[i] > 0.0 && 1.0 - share < self.null_share
         })
+    }
+
+    /// The directions that are not determined.
+    pub fn undetermined<const N: usize>(&self) -> Undetermined<N> {
+        let kept: Vec<usize> = self.determined().collect();
+        // What no row speaks of has no scale of its own.
+        let scale = |i: usize| if self.scale[i] > 0.0 { self.scale[i] } else { self.scale.max() };
+        let direction = |k: usize| SVector::from_fn(|i, _| self.eigenvectors[(i, k)] * scale(i));
+        let free = (0..self.eigenvalues.len()).filter(|k| !kept.contains(k));
+        Undetermined::spanned(free.map(direction), self.null_share.sqrt())
     }
 
     /// θ as far as it is determined: the unobserved components at zero.

@@ -1,6 +1,7 @@
 //! Rows of a linear system, and the sums that solve it.
 
 use nalgebra::{SMatrix, SVector};
+use rayon::prelude::*;
 
 use super::Unsolvable;
 use crate::constrain::LinearConstraint;
@@ -61,6 +62,19 @@ impl<const N: usize> NormalEquations<N> {
             }
         }
         sums
+    }
+
+    /// Sums over rows with their weights, in fixed strips: the same whatever the number of threads.
+    pub fn weighted(rows: &[Row<N>], weights: &[f64]) -> Self {
+        const STRIP: usize = 16_384;
+        let strips = rows.par_chunks(STRIP).zip(weights.par_chunks(STRIP));
+        let parts: Vec<Self> =
+            strips.map(|(rows, w)| Self::over(rows.iter().zip(w.iter().copied()))).collect();
+        parts.iter().fold(Self::default(), |sum, part| Self {
+            information: sum.information + part.information,
+            moment: sum.moment + part.moment,
+            rows: sum.rows + part.rows,
+        })
     }
 
     /// The θ that minimises Σ w (b − a · θ)², with the directions no row speaks of left at zero.

@@ -4,8 +4,8 @@ use nalgebra::{ArrayStorage, Matrix6, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::blocks::{BlockScore, Blocks};
-use super::m_estimator::StudentT;
 use super::measurement::{At, Linearised, Measurement};
+use super::mixture::Mixture;
 use crate::geometry::gaussian::{accumulate, product};
 use crate::observe::dispatch::vectorised;
 use crate::observe::{StereoFlow, StereoTrack};
@@ -23,6 +23,10 @@ pub struct Step {
     weights: f64,
     /// Σ w q.
     pub(super) weighted_square: f64,
+    /// Σ w² q.
+    score_square: f64,
+    /// Σ −2 (∂w/∂q) q, with q in its own units.
+    falling_off: f64,
     /// Σ q.
     pub(super) square: f64,
     /// Number of observations in front of the camera.
@@ -36,7 +40,7 @@ pub struct Step {
 pub struct Weighing<'a> {
     /// Blocks whose sums are wanted; without them all is one block.
     pub(super) blocks: Option<&'a Blocks>,
-    pub(super) kernel: &'a StudentT,
+    pub(super) mixture: Mixture,
     /// Squared scale of the misclosures in units of their stated covariance.
     pub(super) scale2: f64,
 }
@@ -61,22 +65,36 @@ impl Step {
         self.weighted_square / (3.0 * self.weights)
     }
 
+    /// Factor from the inverse of Σ w Gᵀ S⁻¹ G to the covariance, where residuals are independent and spherical.
+    ///
+    /// The sandwich B⁻¹ M B⁻¹, of which M = Σ w² q/3 Gᵀ S⁻¹ G and B = Σ (w + 2 q ∂w/∂q/3) Gᵀ S⁻¹ G are taken as
+    /// multiples of the information (Huber's proposal); the residuals of few observations are short by those of φ.
+    pub(super) fn spread(&self) -> f64 {
+        let meat = self.score_square / (3.0 * self.weights);
+        let bread = 1.0 - self.falling_off / (3.0 * self.weights);
+        let residuals = (3 * self.used) as f64;
+        meat / (bread * bread) * residuals / (residuals - 6.0).max(1.0)
+    }
+
     #[inline(always)]
     fn add(&mut self, l: &Linearised, weighing: &Weighing<'_>) {
-        let (kernel, scale2) = (weighing.kernel, weighing.scale2);
-        let q = l.misclosure.dot(&product(&l.inverse_cov, &l.misclosure));
-        let weight = kernel.weight(q / scale2, 3.0);
+        let scale2 = weighing.scale2;
+        let pull = product(&l.inverse_cov, &l.misclosure);
+        let q = l.misclosure.dot(&pull);
+        let (weight, slope) = weighing.mixture.weight(q / scale2);
         let weighted = product(&l.by_motion.transpose(), &(l.inverse_cov * weight));
-        let score: Vector6<f64> = product(&weighted, &l.misclosure);
+        let unweighted: Vector6<f64> = product(&l.by_motion.transpose(), &pull);
         accumulate(&mut self.score.information, &weighted, &l.by_motion);
         accumulate(&mut self.score.score, &weighted, &l.misclosure);
-        let change = kernel.curvature(q / scale2, 3.0) / (scale2 * weight * weight);
-        accumulate(&mut self.reweighting, &(score * change), &score.transpose());
+        let change = weight * slope / scale2;
+        accumulate(&mut self.reweighting, &(unweighted * change), &unweighted.transpose());
         let [x, y, d] = l.by_phase.data.0;
         let errors = SMatrix::<f64, 3, 4>::from_data(ArrayStorage([x, y, d, l.by_offset.into()]));
         accumulate(&mut self.shared, &weighted, &errors);
         self.weights += weight;
         self.weighted_square += weight * q;
+        self.score_square += weight * weight * q;
+        self.falling_off += change * q;
         self.square += q;
         self.used += 1;
         self.inliers += usize::from(q <= INLIER_Q * scale2);
@@ -89,6 +107,8 @@ impl Step {
         self.shared += other.shared;
         self.weights += other.weights;
         self.weighted_square += other.weighted_square;
+        self.score_square += other.score_square;
+        self.falling_off += other.falling_off;
         self.square += other.square;
         self.used += other.used;
         self.inliers += other.inliers;

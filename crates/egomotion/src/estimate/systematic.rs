@@ -10,8 +10,9 @@ use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
 
 use super::Observability;
 use super::m_estimator::StudentT;
-use super::maximum_likelihood::robust_scale2;
+use super::maximum_likelihood::squares;
 use super::measurement::{At, Measurement};
+use super::mixture::Mixture;
 use super::step::{Step, Sums, Weighing};
 use crate::geometry::{StereoRig, Twist};
 
@@ -51,9 +52,9 @@ pub fn common_errors<M: Measurement>(
     kernel: &StudentT,
 ) -> Option<CommonErrors> {
     let at = At::new(*phi, rig);
-    let scale2 = if kernel.nu.is_infinite() { 1.0 } else { robust_scale2(observations, phi, rig)? };
+    let (mixture, scale2) = Mixture::of(kernel, &mut squares(observations, &at))?;
     let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
-    let weighing = Weighing { blocks: None, kernel, scale2 };
+    let weighing = Weighing { blocks: None, mixture, scale2 };
     CommonErrors::of(&Sums::over(observations, &mut structures, &at, &weighing).whole)
 }
 
@@ -90,7 +91,7 @@ mod tests {
     fn the_response_is_what_the_estimator_does() {
         let rig = StereoRig::new(400.0, (159.5, 119.5), 0.15, (320, 240)).unwrap();
         let phi = Twist { t: Vector3::new(0.02, -0.01, -0.2), omega: Vector3::new(0.004, -0.006, 0.002) };
-        let kernel = StudentT { nu: f64::INFINITY, iterations: 50, tolerance: 1e-10 };
+        let kernel = StudentT { nu: f64::INFINITY, iterations: 50, tolerance: 1e-10, ..StudentT::default() };
         let solve = |amplitude, offset| {
             let tracks = tracks(&rig, &phi, amplitude, offset);
             maximum_likelihood(&tracks, &rig, &phi, None, &kernel).unwrap().motion.theta.mean - phi.vector()

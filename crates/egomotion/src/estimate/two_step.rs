@@ -46,7 +46,8 @@ pub fn two_step(
     system.add(&first_rows, &first, FIRST);
     system.add(&second_rows, &second, SECOND);
     system.couple(flow, &second);
-    let (mut cov, mut observed) = system.covariance()?;
+    let (mut cov, observability) = system.covariance()?;
+    let (mut observed, mut undetermined) = (observability.observed(), observability.undetermined());
     let mut mean = Vector6::zeros();
     for i in 0..3 {
         mean[FIRST[i]] = first.theta[i];
@@ -54,6 +55,7 @@ pub fn two_step(
     }
     if first.observability.rank() < 3 {
         SECOND.into_iter().for_each(|i| observed[i] = false);
+        undetermined = undetermined.with_components(SECOND);
         cov = blocks::with_unknowns(cov, &observed);
     }
     for i in (0..6).filter(|&i| !observed[i]) {
@@ -62,6 +64,7 @@ pub fn two_step(
     Ok(Estimate {
         theta: Gaussian { mean, cov },
         observed,
+        undetermined,
         rows: dv.len() + flow.len(),
         inliers: first.inliers + second.inliers,
         residual_scale: second.residual_scale,
@@ -134,10 +137,10 @@ impl StackedSystem {
         }
     }
 
-    fn covariance(&self) -> Result<(Matrix6<f64>, [bool; 6]), Unsolvable> {
+    fn covariance(&self) -> Result<(Matrix6<f64>, Observability), Unsolvable> {
         let total: Matrix6<f64> = self.scores.iter().map(|block| block.information).sum();
         let observability = Observability::of(&total)?;
         let inverse = self.bread.try_inverse();
-        Ok((blocks::covariance(&self.scores, inverse.as_ref(), &observability), observability.observed()))
+        Ok((blocks::covariance(&self.scores, inverse.as_ref(), &observability), observability))
     }
 }

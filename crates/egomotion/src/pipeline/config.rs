@@ -48,6 +48,8 @@ pub enum EstimatorKind {
     Lmeds,
     /// Iteratively reweighted least squares, rows weighted by their own variance.
     Irls,
+    /// Errors in variables: the same weights, without the bias that noisy gradients bring; for `dcce` alone.
+    Eiv,
 }
 
 /// What is measured in the images.
@@ -102,7 +104,7 @@ impl Default for Config {
             estimator: EstimatorKind::Irls,
             observe: Observe::Dense,
             seed: 1,
-            block_px: 40.0,
+            block_px: 48.0,
             sample_step_px: 3,
             window: VehicleWindow::default(),
             tracks: TrackOptions::default(),
@@ -123,6 +125,11 @@ pub enum ConfigError {
         "method ml weighs its observations robustly itself: use estimator irls (the default), not ls or lmeds"
     )]
     MaximumLikelihoodEstimator,
+    /// Only the depth change constraint has measured gradients among its regressors.
+    #[error(
+        "estimator eiv corrects for the noisy gradients of method dcce, which no other method has: use method dcce, or estimator irls (the default)"
+    )]
+    ErrorsInVariablesMethod,
     /// Alignment needs points before and after.
     #[error(
         "methods rigid and linear22 align points before and after: use approach discrete (the default), not differential"
@@ -148,7 +155,13 @@ impl Config {
     /// [`ConfigError`] gives the reason.
     pub fn check(&self) -> Result<(), ConfigError> {
         if self.method == Method::Ml && self.estimator != EstimatorKind::Irls {
-            return Err(ConfigError::MaximumLikelihoodEstimator);
+            return Err(match self.estimator {
+                EstimatorKind::Eiv => ConfigError::ErrorsInVariablesMethod,
+                _ => ConfigError::MaximumLikelihoodEstimator,
+            });
+        }
+        if self.method != Method::Dcce && self.estimator == EstimatorKind::Eiv {
+            return Err(ConfigError::ErrorsInVariablesMethod);
         }
         let alignment = matches!(self.method, Method::Rigid | Method::Linear22);
         if alignment && self.approach == Approach::Differential {

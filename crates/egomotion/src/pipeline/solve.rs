@@ -3,6 +3,7 @@
 use super::config::{Approach, Config, EstimatorKind, Method};
 use crate::constrain::{binocular_flow, dcce, image_flow};
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
+use crate::estimate::errors_in_variables::errors_in_variables;
 use crate::estimate::least_squares::{Weighting, least_squares};
 use crate::estimate::lmeds::{LmedsOptions, lmeds};
 use crate::estimate::m_estimator::m_estimate;
@@ -101,7 +102,8 @@ impl<'a> Solver<'a> {
         match self.config.estimator {
             EstimatorKind::Ls => least_squares(rows, Weighting::Unit),
             EstimatorKind::Lmeds => lmeds(rows, Weighting::Unit, &self.lmeds()),
-            EstimatorKind::Irls => {
+            // Noise in the regressors is that of observations, which rows alone do not tell; `Config::check` refuses it.
+            EstimatorKind::Irls | EstimatorKind::Eiv => {
                 let start = least_squares(rows, Weighting::InverseVariance)?.theta;
                 m_estimate(rows, &start, &self.config.irls)
             }
@@ -134,6 +136,9 @@ impl<'a> Solver<'a> {
     /// # Errors
     /// [`Unsolvable`] when the observations do not determine a motion.
     pub fn depth_change(&self, changes: &[DepthChange]) -> Result<MotionEstimate, Unsolvable> {
+        if self.config.estimator == EstimatorKind::Eiv {
+            return errors_in_variables(changes, self.rig, self.start, &self.blocks);
+        }
         let rows: Vec<Row<6>> = changes
             .iter()
             .map(|change| {
@@ -182,7 +187,9 @@ impl<'a> Solver<'a> {
         let fit = match self.config.estimator {
             EstimatorKind::Ls => least_squares(&rows, Weighting::InverseVariance)?,
             EstimatorKind::Lmeds => lmeds(&rows, Weighting::InverseVariance, &self.lmeds())?,
-            EstimatorKind::Irls => m_estimate(&rows, &self.start.vector(), &self.config.irls)?,
+            EstimatorKind::Irls | EstimatorKind::Eiv => {
+                m_estimate(&rows, &self.start.vector(), &self.config.irls)?
+            }
         };
         Ok(fit.estimate(&rows))
     }
@@ -202,7 +209,7 @@ impl<'a> Solver<'a> {
         let fitting = match self.config.estimator {
             EstimatorKind::Ls => Fitting::LeastSquares,
             EstimatorKind::Lmeds => Fitting::Lmeds(self.lmeds()),
-            EstimatorKind::Irls => Fitting::MEstimator(self.config.irls),
+            EstimatorKind::Irls | EstimatorKind::Eiv => Fitting::MEstimator(self.config.irls),
         };
         align(&pairs, form, &fitting)
     }

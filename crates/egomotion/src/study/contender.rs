@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::draw::{Differential, Discrete};
 use crate::estimate::alignment::Form;
-use crate::estimate::m_estimator::StudentT;
 use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{StereoRig, Twist};
@@ -30,6 +29,9 @@ pub fn approach_name(approach: Approach) -> &'static str {
     }
 }
 
+/// Side of the blocks within which rows are correlated, in pixels.
+const STENCIL_BLOCK_PX: f64 = 12.0;
+
 impl Contender {
     /// All that have a meaning in an approach.
     pub fn all(approach: Approach) -> Vec<Self> {
@@ -42,7 +44,8 @@ impl Contender {
         let linear = methods.iter().flat_map(|&method| {
             estimators.into_iter().map(move |estimator| Self { approach, method, estimator })
         });
-        linear.chain([Self { approach, method: M::Ml, estimator: E::Irls }]).collect()
+        let corrected = Self { approach, method: M::Dcce, estimator: E::Eiv };
+        linear.chain([corrected]).chain([Self { approach, method: M::Ml, estimator: E::Irls }]).collect()
     }
 
     /// Name of the method, in files.
@@ -64,18 +67,21 @@ impl Contender {
             (_, EstimatorKind::Ls) => "ls",
             (_, EstimatorKind::Lmeds) => "lmeds",
             (_, EstimatorKind::Irls) => "irls",
+            (_, EstimatorKind::Eiv) => "eiv",
         }
     }
 
-    fn config(&self, seed: u64) -> Config {
+    /// How it is run in the synthetic world.
+    pub fn config(&self, seed: u64) -> Config {
         Config {
             method: self.method,
             approach: self.approach,
             estimator: self.estimator,
+            // Pixels share nothing but the stencils of their differences.
+            block_px: STENCIL_BLOCK_PX,
             seed,
-            // The noise of the synthetic world is Gaussian, so its likelihood is.
+            // Points of the synthetic world share no error of a matcher.
             maximum_likelihood: MaximumLikelihoodOptions {
-                kernel: StudentT { nu: f64::INFINITY, ..StudentT::default() },
                 phase_error_px: 0.0,
                 ..MaximumLikelihoodOptions::default()
             },
@@ -92,10 +98,9 @@ impl Contender {
         draw: &Differential<'_>,
         rig: &StereoRig,
         start: &Twist,
-        seed: u64,
+        config: &Config,
     ) -> Result<MotionEstimate, Unsolvable> {
-        let config = self.config(seed);
-        let solver = Solver::new(rig, start, &config);
+        let solver = Solver::new(rig, start, config);
         match self.method {
             Method::Dcce => {
                 let bf = rig.depth_disparity_product();
@@ -117,10 +122,9 @@ impl Contender {
         draw: &Discrete<'_>,
         rig: &StereoRig,
         start: &Twist,
-        seed: u64,
+        config: &Config,
     ) -> Result<MotionEstimate, Unsolvable> {
-        let config = self.config(seed);
-        let solver = Solver::new(rig, start, &config);
+        let solver = Solver::new(rig, start, config);
         let flows = || draw.motions.iter().map(|track| track.discrete_flow()).collect::<Vec<_>>();
         match self.method {
             Method::Dcce => {

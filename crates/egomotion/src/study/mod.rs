@@ -7,6 +7,7 @@ pub mod assumptions;
 pub mod consistency;
 pub mod contender;
 pub mod draw;
+pub mod efficiency;
 pub mod figure;
 pub mod real;
 pub mod sensitivity;

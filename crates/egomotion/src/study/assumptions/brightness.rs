@@ -53,7 +53,7 @@ pub(super) fn errors(step: f64, seed: u64) -> Vec<BrightnessError> {
                 method: Method::Dcce,
                 estimator: EstimatorKind::Ls,
             };
-            Some(dcce.differential(&draw, &world.rig, &Twist::zero(), seed).ok()?.phi())
+            Some(dcce.differential(&draw, &world.rig, &Twist::zero(), &dcce.config(seed)).ok()?.phi())
         };
         (0..DRAWS).filter_map(of).collect()
     };

@@ -188,7 +188,9 @@ impl<'a> Trial<'a> {
             floor_m,
             bound: cov.map(|cov| (cov, draw.pixels.iter().map(|p| variance(&cov, p)).collect())),
             through: Box::new(move |phi| points.iter().map(|p| phi.velocity(p).z).collect()),
-            solve: Box::new(move |contender, at| contender.differential(&draw, rig, at, seed).ok()),
+            solve: Box::new(move |contender, at| {
+                contender.differential(&draw, rig, at, &contender.config(seed)).ok()
+            }),
         }
     }
 
@@ -219,7 +221,9 @@ impl<'a> Trial<'a> {
                 let motion = phi.exp();
                 points.iter().map(|p| motion.apply(p).z - p.z).collect()
             }),
-            solve: Box::new(move |contender, at| contender.discrete(&draw, rig, at, seed).ok()),
+            solve: Box::new(move |contender, at| {
+                contender.discrete(&draw, rig, at, &contender.config(seed)).ok()
+            }),
         }
     }
 
