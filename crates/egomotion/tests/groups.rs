@@ -107,8 +107,8 @@ impl Composite<'_> {
 const ROOM_MM_DEG: [f64; 6] = [10.0, -10.0, -15.0, 0.1, 0.1, 0.0];
 const BODY_MM_DEG: [f64; 6] = [25.0, 5.0, -40.0, 0.2, 0.6, 0.0];
 
-/// NEES of φ, and of the body's pairs the share that found it with its VZ within 3σ.
-fn captured(half_width_m: f64, share: std::ops::Range<f64>) -> (Vec<f64>, Vec<Option<f64>>) {
+/// NEES/6 of φ of eight pairs, and by how many σ VZ of the body is off; `foreseen` after frames without the body.
+fn captured(half_width_m: f64, share: std::ops::Range<f64>, foreseen: bool) -> (Vec<f64>, Vec<Option<f64>>) {
     let sequence = sequence("C");
     let left = sequence.rig.left_from_cyclopean();
     let [of_room, of_body] = [ROOM_MM_DEG, BODY_MM_DEG].map(|motion| twist_from_mm_deg(&motion));
@@ -124,10 +124,19 @@ fn captured(half_width_m: f64, share: std::ops::Range<f64>) -> (Vec<f64>, Vec<Op
         let noise = SensorNoise::default().with_seed(number);
         let (first, covered) = composite.frame(&pose, &RigidMotion::identity(), &noise, 0);
         assert!(share.contains(&covered), "the body covers {covered}");
-        let after = |pose: RigidMotion, phi: &Twist| pose.after(&phi.exp().inverse());
-        let second_poses = (after(pose, &of_room), after(RigidMotion::identity(), &of_body));
-        let (next, _) = composite.frame(&second_poses.0, &second_poses.1, &noise, 1);
-        let answer = second(sequence.rig, [first, next]);
+        let [room_to, body_to] = [of_room, of_body].map(|phi| phi.exp().inverse());
+        let (next, _) = composite.frame(&pose.after(&room_to), &body_to, &noise, 1);
+        let mut pipeline = StereoMotion::new(sequence.rig, Config::default()).unwrap();
+        if foreseen {
+            // Before, the room was alone in the image and moved as it does.
+            let before = pose.after(&of_room.exp());
+            for (k, pose) in [before.after(&of_room.exp()), before].iter().enumerate() {
+                let seen = noise.expose(&View::new(&room, &sequence.rig, *pose).render(3), 2 + k as u64);
+                pipeline.push(StereoFrame { time_s: k as f64 - 2.0, left: seen.left, right: seen.right });
+            }
+        }
+        pipeline.push(first);
+        let answer = pipeline.push(next);
         let motion = answer.motion.as_ref().unwrap();
         let truth = of_room.seen_from(&left);
         let square = motion.theta.mahalanobis2(&truth.vector()).unwrap();
@@ -152,14 +161,25 @@ fn captured(half_width_m: f64, share: std::ops::Range<f64>) -> (Vec<f64>, Vec<Op
     (nees, sigmas)
 }
 
+/// φ within its covariance, and the body found with its VZ within 3σ in all pairs but one at most.
+fn assert_apart(half_width_m: f64, share: std::ops::Range<f64>, foreseen: bool) {
+    let (nees, sigmas) = captured(half_width_m, share.clone(), foreseen);
+    let mean = nees.iter().sum::<f64>() / nees.len() as f64;
+    let found = sigmas.iter().filter(|s| s.is_some_and(|s| s.abs() < 3.0)).count();
+    println!("{share:?}: NEES/6 {mean:.2}, {found} found");
+    assert!(mean < 2.0, "{share:?}: {nees:?}");
+    assert!(found + 1 >= sigmas.len(), "{share:?}: {sigmas:?}");
+}
+
 #[test]
-fn a_large_body_does_not_capture_the_motion() {
-    for (half_width_m, share) in [(0.20, 0.10..0.20), (0.29, 0.22..0.36), (0.37, 0.38..0.52)] {
-        let (nees, sigmas) = captured(half_width_m, share.clone());
-        let mean = nees.iter().sum::<f64>() / nees.len() as f64;
-        let found = sigmas.iter().filter(|s| s.is_some_and(|s| s.abs() < 3.0)).count();
-        println!("{share:?}: NEES/6 {mean:.2}, found {found}");
-        assert!(mean < 2.0, "{share:?}: {nees:?}");
-        assert!(found >= 7, "{share:?}: {sigmas:?}");
-    }
+fn a_body_does_not_capture_the_motion() {
+    assert_apart(0.185, 0.13..0.17, false);
+    assert_apart(0.27, 0.28..0.33, false);
+}
+
+/// At this size the textured body holds more than half of the tracks. Of a single pair nobody can know then which
+/// of the two moves, and the body's motion is taken for the scene's; after frames without it the scene's goes on.
+#[test]
+fn a_body_that_holds_most_tracks_does_not_capture_a_motion_that_goes_on() {
+    assert_apart(0.335, 0.42..0.48, true);
 }

@@ -7,11 +7,11 @@ use egomotion::motion::obstacle::Belief;
 use egomotion::pipeline::{Config, StereoFrame, StereoMotion};
 use egomotion::sim::{SensorNoise, Sequence};
 
-/// Fewest cells of a surface that is ahead, about four times what makes a region.
+/// Fewest cells of a surface that is ahead; half of each crosses: what only just crosses need not be found.
 const LEAST_CELLS: usize = 4;
 
 /// Seconds from frame `k + 1` until the nearest obstacle is met, by the definition on exact values: of each
-/// surface the cells of which a quarter crosses the window, their medians, and of these the tenth that comes first.
+/// surface the cells of which half crosses the window, their medians, and of these the tenth that comes first.
 fn truth_s(sequence: &Sequence, k: usize) -> Option<f64> {
     let (view, motion, window) = (sequence.view(k)?, sequence.phi(k)?.exp(), Config::default().window);
     let cell = Belief::DENSE.cell_px;
@@ -27,7 +27,7 @@ fn truth_s(sequence: &Sequence, k: usize) -> Option<f64> {
     }
     let mut surfaces: BTreeMap<u16, Vec<f64>> = BTreeMap::new();
     for ((surface, ..), mut seconds) in cells {
-        if 4 * seconds.len() >= cell * cell {
+        if 2 * seconds.len() >= cell * cell {
             surfaces.entry(surface).or_default().extend(upper_median(&mut seconds, f64::total_cmp));
         }
     }
@@ -35,7 +35,6 @@ fn truth_s(sequence: &Sequence, k: usize) -> Option<f64> {
         medians.sort_by(f64::total_cmp);
         medians[(0.1 * medians.len() as f64).round() as usize]
     };
-    // A surface that only just crosses is not ahead.
     surfaces.into_values().filter(|cells| cells.len() >= LEAST_CELLS).map(first).min_by(f64::total_cmp)
 }
 

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::config::{Approach, Config, Method, Observe};
+use super::contested::scene_motion;
 use super::groups::{Groups, MovingGroup};
 use super::maps::{MotionMaps, motion_maps, track_sightings};
 use super::moving::Moving;
@@ -134,12 +135,16 @@ impl FramePair<'_> {
         Hints { shift, motion, mask: self.mask }
     }
 
-    /// The motion of most tracks.
+    /// The motion of most tracks, or of those that go on as before where a body holds most.
     fn rough(&self, tracks: &[StereoTrack], prior: Option<&Twist>) -> Result<Twist, Unsolvable> {
         let own = &self.config.maximum_likelihood;
         let options = &MaximumLikelihoodOptions { seed: own.seed ^ self.config.seed, ..*own };
-        let start = robust_start(tracks, self.rig, prior, options)?;
-        self.refined(tracks, &start)
+        let of_most = |tracks: &[StereoTrack]| {
+            let start = robust_start(tracks, self.rig, prior, options)?;
+            self.refined(tracks, &start)
+        };
+        let found = of_most(tracks)?;
+        Ok(prior.map_or(found, |prior| scene_motion(tracks, self.rig, found, prior, of_most)))
     }
 
     fn refined(&self, tracks: &[StereoTrack], start: &Twist) -> Result<Twist, Unsolvable> {

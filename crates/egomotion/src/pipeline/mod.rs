@@ -1,6 +1,7 @@
 //! From frames to motion: the one place where all steps meet.
 
 pub mod config;
+mod contested;
 mod frame_pair;
 pub mod groups;
 mod map_row;
