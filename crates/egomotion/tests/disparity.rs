@@ -170,12 +170,12 @@ fn what_is_filled_in_is_behind_and_says_that_it_is_a_guess() {
     let behind = share(&map, 78..88, |d| d.is_some_and(|d| (d.0 - 6.0).abs() < 1.0));
     let guessed = share(&map, 78..88, |d| d.is_some_and(|d| d.1 >= GUESS_SIGMA_PX));
     assert!(behind > 0.9 && guessed > 0.9, "{behind} behind, {guessed} guessed");
-    // What is measured stays as it is.
+    // What is measured stays as it is, but beside what was filled in it may be of that surface.
     let measured = compute(&left, &right);
     for (u, v) in (0..SIZE.1).flat_map(|v| (0..SIZE.0).map(move |u| (u, v))) {
         if measured.shift.get(u, v).is_some() {
             assert_eq!(measured.shift.get(u, v), map.shift.get(u, v));
-            assert_eq!(measured.sigma.get(u, v), map.sigma.get(u, v));
+            assert!(measured.sigma.get(u, v) <= map.sigma.get(u, v));
         }
     }
 }

@@ -111,7 +111,7 @@ const ITERATIONS: usize = 20;
 /// The iteration ends when fewer rows than one in so many change sides.
 const SETTLED: usize = 10_000;
 /// A direction is determined whose information exceeds so many standard errors.
-const CERTAIN: f64 = 2.0;
+const CERTAIN: f64 = 2.5;
 /// Rows summed by one task; fixed, so that sums do not depend on the number of threads.
 const STRIP: usize = 4096;
 
