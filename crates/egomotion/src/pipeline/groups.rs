@@ -9,7 +9,7 @@ use super::moving::Moving;
 use super::solve::Solver;
 use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, robust_start};
 use crate::estimate::{Blocks, MotionEstimate, median};
-use crate::geometry::{Gaussian, PixelBounds, StereoRig, upper_median};
+use crate::geometry::{Cells, Gaussian, PixelBounds, StereoRig, upper_median};
 use crate::motion::TimeToImpact;
 use crate::motion::depth_velocity::{DepthVelocity, RigidPrediction, contradict};
 use crate::observe::{DensePair, StereoTrack};
@@ -68,7 +68,8 @@ pub struct Groups<'a> {
 }
 
 impl<'a> Groups<'a> {
-    /// Group the moving cells, the largest group first; `still` is the rigid scene's motion, and `predict` makes of a group's motion what its pixels do.
+    /// Group the moving cells, the largest group first; `still` is the rigid scene's motion, and `predict` makes of
+    /// a group's motion what its pixels do.
     pub(super) fn find(
         pair: &DensePair<'_>,
         moving: Moving,
@@ -91,13 +92,12 @@ impl<'a> Groups<'a> {
                 continue;
             }
             let rigid = motion.filter(MotionEstimate::is_complete).and_then(|m| predict(&sampled.tracks, &m));
-            let Some(mut body) = sampled.body(pair.rig, motion, rigid, dt_s) else { continue };
             let mut region = region;
-            region
-                .extend(body.rigid.as_ref().map_or_else(Vec::new, |rigid| groups.gaps(pair, &region, rigid)));
+            if let Some(rigid) = &rigid {
+                region.extend(groups.gaps(pair, &region, rigid));
+            }
             let layout = groups.moving.layout();
-            body.group.pixels = region.len() * layout.size_px().pow(2);
-            body.group.bounds = layout.bounds(&region).unwrap_or(body.group.bounds);
+            let Some(body) = sampled.body(pair.rig, layout, &region, motion, rigid, dt_s) else { continue };
             region.iter().for_each(|&cell| groups.of_cell[cell] = Some(groups.bodies.len()));
             groups.bodies.push(body);
         }
@@ -254,6 +254,8 @@ impl Sampled {
     fn body<'a>(
         &self,
         rig: &StereoRig,
+        layout: &Cells,
+        region: &[usize],
         motion: Option<MotionEstimate>,
         rigid: Option<RigidPrediction<'a>>,
         dt_s: f64,
@@ -269,8 +271,8 @@ impl Sampled {
         let measured = || upper_median(&mut self.velocities.iter().map(|m| m.2).collect::<Vec<_>>(), by_vz);
         let velocity = by_motion.or_else(measured)?;
         let group = MovingGroup {
-            pixels: 0,
-            bounds: PixelBounds { u: 0, v: 0, width: 0, height: 0 },
+            pixels: region.len() * layout.size_px().pow(2),
+            bounds: layout.bounds(region)?,
             centre_px,
             depth_m: rig.depth(d)?,
             motion,
