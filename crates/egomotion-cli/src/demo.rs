@@ -63,7 +63,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
             Ok(())
         },
     )?;
-    folder.write_motion(&outcome)?;
+    folder.write_motion(&config, &outcome)?;
     let mut summary = Summary::new("demo".into(), sequence.rig, &config, &outcome);
     summary.truth_maps = verdicts.vz.verdict();
     folder.write_json("summary.json", &summary)?;

@@ -8,6 +8,7 @@ mod feed;
 mod info;
 mod judge;
 mod memory;
+mod moving;
 mod report;
 mod results;
 mod run;

@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use egomotion::geometry::StereoRig;
 use egomotion::motion::TimeToImpact;
-use egomotion::pipeline::Config;
 use egomotion::pipeline::stereo::DenseResults;
+use egomotion::pipeline::{Config, Observe};
 use egomotion_io::trajectory::{Pose, write_kitti, write_tum};
 use egomotion_io::{flo, pfm, write};
 use serde::Serialize;
 
+use crate::moving;
 use crate::report::{self, FrameRow, Report};
 use crate::session::{Outcome, Row};
 
@@ -86,8 +87,8 @@ impl ResultFolder {
         Ok(())
     }
 
-    /// Write the trajectory in both formats and `motion.csv`.
-    pub fn write_motion(&self, outcome: &Outcome) -> Result<()> {
+    /// Write the trajectory in both formats, `motion.csv`, and where every pixel was seen `moving.csv`.
+    pub fn write_motion(&self, config: &Config, outcome: &Outcome) -> Result<()> {
         let times = outcome.trajectory.times_s();
         let poses: Vec<Pose> = outcome
             .trajectory
@@ -98,6 +99,9 @@ impl ResultFolder {
             .collect();
         write_tum(&self.path.join("trajectory_tum.txt"), &poses)?;
         write_kitti(&self.path.join("trajectory_kitti.txt"), &poses)?;
+        if config.observe == Observe::Dense {
+            self.write("moving.csv", moving::table(&outcome.rows)?.as_bytes())?;
+        }
         self.write("motion.csv", motion_table(&outcome.rows)?.as_bytes())
     }
 }
@@ -126,7 +130,7 @@ impl ResultFolder {
                 dt_s: row.motion.dt_s,
                 motion: row.motion.motion.as_ref().ok().copied(),
                 truth: row.truth,
-                impact: row.motion.impact,
+                impact: row.motion.obstacle.map(|obstacle| obstacle.impact),
                 status: status(row).to_owned(),
             })
             .collect();
@@ -142,7 +146,7 @@ impl ResultFolder {
             pictures: outcome.album.pictures(),
             stages_ms: outcome.stages_ms.clone(),
             frame_ms: outcome.frame_ms,
-            notes: about.notes.clone(),
+            notes: about.notes.iter().cloned().chain(moving::note(&outcome.rows)).collect(),
         });
         self.write("report.html", page.as_bytes())
     }
@@ -188,7 +192,7 @@ fn motion_record(row: &Row) -> Vec<String> {
         }
         Err(_) => record.extend(std::iter::repeat_n(String::new(), 6 + 21 + 3)),
     }
-    let interval = motion.impact.and_then(|impact| Some((impact.seconds()?, impact.interval95_s()?)));
+    let interval = motion.impact().and_then(|impact| Some((impact.seconds()?, impact.interval95_s()?)));
     match interval {
         Some((seconds, (lo, hi))) => record.extend([seconds, lo, hi].map(number)),
         None => record.extend(std::iter::repeat_n(String::new(), 3)),

@@ -166,7 +166,7 @@ fn run_sequence(
             Ok(())
         },
     )?;
-    folder.write_motion(&outcome)?;
+    folder.write_motion(config, &outcome)?;
     let mut summary = Summary::new(args.source.display().to_string(), rig, config, &outcome);
     summary.truth_maps = truth_maps;
     folder.write_json("summary.json", &summary)?;

@@ -22,6 +22,8 @@ pub struct Summary {
     pub seed: u64,
     /// Rows by status.
     pub counts: BTreeMap<&'static str, usize>,
+    /// Answered intervals without an obstacle, by reason.
+    pub no_obstacle: BTreeMap<&'static str, usize>,
     /// Mean milliseconds per frame.
     pub stages_ms: BTreeMap<&'static str, f64>,
     /// From the first decode to the last motion row, over frames; writing and report excluded.
@@ -40,9 +42,12 @@ pub struct Summary {
 
 impl Summary {
     pub fn new(source: String, rig: StereoRig, config: &Config, outcome: &Outcome) -> Self {
-        let mut counts = BTreeMap::new();
+        let (mut counts, mut no_obstacle) = (BTreeMap::new(), BTreeMap::new());
         for row in outcome.rows.iter().skip(1) {
             *counts.entry(status(row)).or_insert(0) += 1;
+            if let (Ok(_), Err(why)) = (&row.motion.motion, &row.motion.obstacle) {
+                *no_obstacle.entry(why.code()).or_insert(0) += 1;
+            }
         }
         Self {
             version: env!("CARGO_PKG_VERSION"),
@@ -53,6 +58,7 @@ impl Summary {
             seed: config.seed,
             config: config.clone(),
             counts,
+            no_obstacle,
             stages_ms: outcome.stages_ms.iter().copied().collect(),
             frame_ms: outcome.frame_ms,
             wall_s: outcome.wall_s,

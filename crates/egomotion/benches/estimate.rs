@@ -48,9 +48,7 @@ fn estimation(c: &mut Criterion) {
     let common = common_errors(&tracks, &rig, &motion.phi(), kernel).unwrap();
     let offset = DisparityOffset { sigma_px: 0.1, phi_per_px: common.by_disparity_offset };
     let rigid = RigidPrediction::new(&motion.theta, offset, &rig).unwrap();
-    c.bench_function("maps", |b| {
-        b.iter(|| motion_maps(&pair, (&before, &after), Some(&rigid), &config, 0.1))
-    });
+    c.bench_function("maps", |b| b.iter(|| motion_maps(&pair, Some(&rigid), None, &config, 0.1)));
 }
 
 /// Equations in six unknowns, a share of them outliers.

@@ -3,6 +3,7 @@
 use egomotion::estimate::Estimate;
 use egomotion::geometry::{Gaussian, Grid, Image, Twist};
 use egomotion::metrics::Nees;
+use egomotion::motion::NoObstacle;
 use egomotion::pipeline::stereo::StageTimes;
 use egomotion::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion, Trajectory, Unanswered};
 use egomotion::sim::{SensorNoise, Sequence};
@@ -113,7 +114,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     };
     let (one, two) = (run(1), run(2));
     assert_eq!(one.motion.unwrap(), two.motion.unwrap());
-    assert_eq!(one.impact, two.impact);
+    assert_eq!(one.obstacle, two.obstacle);
     let (one, two) = (one.dense.unwrap(), two.dense.unwrap());
     // NaN is unlike itself: bits are compared.
     let bits = |grid: &Grid<f32>| grid.values().iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
@@ -228,7 +229,8 @@ fn answer(
             residual_scale: 1.0,
         }),
         row_disagreement_px: None,
-        impact: None,
+        obstacle: Err(NoObstacle::NothingMeasured),
+        moving: Vec::new(),
         dense: None,
         stages: StageTimes::default(),
     }

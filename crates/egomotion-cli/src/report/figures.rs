@@ -70,7 +70,8 @@ fn answered(report: &Report<'_>) -> Figure {
 
 /// The shortest time to impact.
 fn soonest(report: &Report<'_>) -> Option<Figure> {
-    let of = |row: &FrameRow| Some((row.impact?.seconds()?, row.impact?.interval95_s()?, row.frame));
+    let of =
+        |row: &FrameRow| Some((row.impact.ok()?.seconds()?, row.impact.ok()?.interval95_s()?, row.frame));
     let times = report.frames.iter().filter_map(of).filter(|(s, ..)| s.is_finite());
     let (seconds, (low, high), frame) = times.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let high = if high.is_finite() { significant(high, 3) } else { "∞".into() };

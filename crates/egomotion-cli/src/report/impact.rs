@@ -1,5 +1,6 @@
 //! Time to impact of the nearest obstacle over time, with its 95 % interval.
 
+use egomotion::motion::NoObstacle;
 use maud::{Markup, html};
 
 use super::Report;
@@ -54,8 +55,24 @@ pub fn chart(report: &Report<'_>) -> Option<Markup> {
     })
 }
 
+/// How often there was no obstacle, and why; `None` if there always was one.
+pub fn none(report: &Report<'_>) -> Option<String> {
+    let answered: Vec<_> = report.frames.iter().filter(|row| row.motion.is_some()).collect();
+    let mut reasons: Vec<(NoObstacle, usize)> = Vec::new();
+    for why in answered.iter().filter_map(|row| row.impact.err()) {
+        match reasons.iter_mut().find(|(known, _)| *known == why) {
+            Some((_, count)) => *count += 1,
+            None => reasons.push((why, 1)),
+        }
+    }
+    let total: usize = reasons.iter().map(|(_, count)| count).sum();
+    let listed: Vec<String> = reasons.iter().map(|(why, count)| format!("{why} ({count})")).collect();
+    (total > 0)
+        .then(|| format!("No obstacle in {total} of {} intervals: {}.", answered.len(), listed.join("; ")))
+}
+
 fn answer(row: &super::FrameRow, time: f64) -> Option<Answer> {
-    let impact = row.impact?;
+    let impact = row.impact.ok()?;
     let (seconds, (low, high)) = impact.seconds().zip(impact.interval95_s())?;
     (seconds.is_finite() && low.is_finite() && !high.is_nan()).then_some(Answer { time, seconds, low, high })
 }

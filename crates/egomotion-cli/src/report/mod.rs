@@ -15,7 +15,7 @@ mod trajectory;
 
 use egomotion::estimate::MotionEstimate;
 use egomotion::geometry::{RigidMotion, StereoRig, Twist};
-use egomotion::motion::TimeToImpact;
+use egomotion::motion::{NoObstacle, TimeToImpact};
 
 pub use page::render;
 pub use pictures::{Album, FramePictures, MOST_PICTURES};
@@ -65,8 +65,8 @@ pub struct FrameRow {
     pub motion: Option<MotionEstimate>,
     /// True φ over the same interval.
     pub truth: Option<Twist>,
-    /// Nearest obstacle.
-    pub impact: Option<TimeToImpact>,
+    /// Time to impact of the nearest obstacle, or why there is none.
+    pub impact: Result<TimeToImpact, NoObstacle>,
     /// `ok`, `partial`, `first`, or why there is no answer.
     pub status: String,
 }

@@ -90,6 +90,7 @@ fn impacts(report: &Report<'_>) -> Markup {
                 }
                 None => p class="empty" { "Nothing in the way approached in this run." },
             }
+            @if let Some(none) = impact::none(report) { p class="small" { (none) } }
         }
     }
 }

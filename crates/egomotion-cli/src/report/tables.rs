@@ -70,7 +70,7 @@ pub fn frames(report: &Report<'_>) -> Markup {
 }
 
 fn impact(row: &FrameRow) -> String {
-    let Some((seconds, (low, high))) = row.impact.and_then(|i| i.seconds().zip(i.interval95_s())) else {
+    let Some((seconds, (low, high))) = row.impact.ok().and_then(|i| i.seconds().zip(i.interval95_s())) else {
         return "–".into();
     };
     let high = if high.is_finite() { significant(high, 3) } else { "∞".into() };

@@ -2,7 +2,7 @@
 
 use egomotion::estimate::{MotionEstimate, Undetermined};
 use egomotion::geometry::{Field, Gaussian, Grid, Image, RigidMotion, StereoRig, Twist};
-use egomotion::motion::TimeToImpact;
+use egomotion::motion::{NoObstacle, TimeToImpact};
 use egomotion::observe::{DisparityMap, FlowField};
 use egomotion::pipeline::maps::MotionMaps;
 use egomotion::pipeline::stereo::DenseResults;
@@ -35,7 +35,9 @@ impl Run {
             dt_s: phi.map(|_| 0.1),
             motion: phi.map(|phi| motion(phi, 1e-6)),
             truth: phi.map(Twist::from_vector),
-            impact: phi.map(|_| TimeToImpact { looming: Gaussian::scalar(0.5, 1e-3) }),
+            impact: phi
+                .map(|_| TimeToImpact { looming: Gaussian::scalar(0.5, 1e-3) })
+                .ok_or(NoObstacle::NothingMeasured),
             status: if phi.is_some() { "ok" } else { "first" }.into(),
         };
         let phis: Vec<_> = std::iter::once(None).chain(phis.iter().map(Some)).collect();
@@ -162,7 +164,7 @@ fn no_number_that_is_not_finite_reaches_a_drawing() {
             if k % 2 == 1 {
                 row.motion = Some(motion(&Vector6::repeat(bad), bad));
                 row.truth = Some(Twist::from_vector(&Vector6::repeat(bad)));
-                row.impact = Some(TimeToImpact { looming: Gaussian::scalar(bad, bad) });
+                row.impact = Ok(TimeToImpact { looming: Gaussian::scalar(bad, bad) });
             }
         }
         run.rows[4].time_s = bad;
@@ -186,7 +188,8 @@ fn nothing_one_frame_and_no_answer_at_all_have_a_page() {
     let one = steady(0);
     let mut silent = steady(4);
     for row in &mut silent.rows {
-        (row.motion, row.truth, row.impact, row.status) = (None, None, None, "few_rows".into());
+        (row.motion, row.truth, row.impact, row.status) =
+            (None, None, Err(NoObstacle::NothingMeasured), "few_rows".into());
     }
     for run in [none, one, silent] {
         let page = render(&run.report());
@@ -208,11 +211,26 @@ fn a_frame_without_answer_is_a_gap_in_every_curve() {
     let mut run = steady(9);
     assert_eq!(curves(&run), 0);
     run.rows[5].motion = None;
-    run.rows[5].impact = None;
+    run.rows[5].impact = Err(NoObstacle::NothingMeasured);
     run.rows[5].status = "bad_image".into();
     // Six estimates, six errors, twelve bands around them, and time to impact.
     assert_eq!(curves(&run), 25);
     assert!(render(&run.report()).contains("1 without an answer"));
+}
+
+#[test]
+fn the_page_says_why_there_is_no_obstacle() {
+    let mut run = steady(9);
+    assert!(!render(&run.report()).contains("No obstacle in"));
+    for (k, why) in
+        [(2, NoObstacle::NothingCrosses), (4, NoObstacle::OnlyScattered), (5, NoObstacle::NothingCrosses)]
+    {
+        run.rows[k].impact = Err(why);
+    }
+    let page = render(&run.report());
+    let sentence = "No obstacle in 3 of 9 intervals: nothing that approaches crosses the vehicle's window (2); \
+                    only scattered points cross the vehicle's window (1).";
+    assert!(page.contains(sentence), "{page}");
 }
 
 #[test]

@@ -28,8 +28,8 @@ fn true_impacts_s(k: usize) -> Vec<((usize, usize), f64)> {
     pixels.filter_map(impact).collect()
 }
 
-/// The answer's definition on the truth: of all blocks of 32 × 32 pixels of which at least a tenth will
-/// pass through the window, the least median.
+/// When the obstacle's nearest part is met, as another definition has it: of all blocks of 32 × 32 pixels of which
+/// at least a tenth will pass through the window, the least median.
 fn nearest_block_s(impacts: &[((usize, usize), f64)]) -> Option<f64> {
     let mut blocks: BTreeMap<(usize, usize), Vec<f64>> = BTreeMap::new();
     for &((u, v), seconds) in impacts {

@@ -51,6 +51,35 @@ fn motion_csv_has_the_columns_of_the_contract() {
 }
 
 #[test]
+fn moving_csv_lists_groups_by_frame() {
+    let mut reader = csv::Reader::from_path(dense_results().join("moving.csv")).unwrap();
+    let head: Vec<String> = reader.headers().unwrap().iter().map(String::from).collect();
+    assert_eq!(
+        head.join(","),
+        "frame,group,u,v,width,height,pixels,depth_m,tx,ty,tz,wx,wy,wz,\
+         sigma_tx,sigma_ty,sigma_tz,sigma_wx,sigma_wy,sigma_wz,vz,vz_sigma,impact_s,impact_lo_s,impact_hi_s"
+    );
+    for record in reader.records() {
+        let record = record.unwrap();
+        let whole = |i: usize| record[i].parse::<usize>().unwrap();
+        assert!((1..FRAMES).contains(&whole(0)));
+        assert!(whole(2) + whole(4) <= SIZE.0 && whole(3) + whole(5) <= SIZE.1, "{record:?}");
+        assert!(record[7].parse::<f64>().unwrap() > 0.0 && record[21].parse::<f64>().unwrap() > 0.0);
+        // φ and its σ are known together.
+        assert!((8..14).all(|i| record[i].is_empty() == record[i + 6].is_empty()));
+    }
+}
+
+#[test]
+fn intervals_without_an_obstacle_are_counted_by_reason() {
+    let rows = motion(dense_results());
+    let none = rows.iter().filter(|row| row.text("impact_s").is_empty()).count();
+    let reasons = summary(dense_results())["no_obstacle"].as_object().unwrap().clone();
+    let counted: u64 = reasons.values().map(|count| count.as_u64().unwrap()).sum();
+    assert_eq!(counted, none as u64, "{reasons:?}");
+}
+
+#[test]
 fn every_row_answers_near_the_truth() {
     let rows = motion(dense_results());
     for (k, row) in rows.iter().enumerate() {

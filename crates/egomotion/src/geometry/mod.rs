@@ -4,12 +4,14 @@
 pub mod gaussian;
 pub mod grid;
 pub mod perspective;
+pub mod regions;
 pub mod rig;
 pub mod twist;
 mod upper_median;
 
 pub use gaussian::Gaussian;
 pub use grid::{Field, Grid, Image};
+pub use regions::{Cells, PixelBounds};
 pub use rig::{RigError, StereoRig};
 pub use twist::{RigidMotion, Twist};
 pub use upper_median::upper_median;

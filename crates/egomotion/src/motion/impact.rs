@@ -1,9 +1,9 @@
-//! Time to impact: the inverse of looming, per pixel and of the nearest obstacle.
+//! Time to impact: the inverse of looming, and the window through which what is an obstacle passes.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::{Gaussian, upper_median};
+use crate::geometry::Gaussian;
 
 /// 97.5 % quantile of the normal distribution: half the width of a 95 % interval, in σ.
 pub const Z95: f64 = 1.959_963_984_540_054;
@@ -69,45 +69,6 @@ impl VehicleWindow {
     }
 }
 
-/// The points seen in one block of neighbouring pixels.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Neighbourhood {
-    /// Time to impact of the points that will cross the vehicle's window.
-    pub crossing: Vec<TimeToImpact>,
-    /// Number of all points with an answer.
-    pub seen: usize,
-}
-
-impl Neighbourhood {
-    /// Count one point: its time to impact if it will cross the window.
-    pub fn add(&mut self, crossing: Option<TimeToImpact>) {
-        self.seen += 1;
-        self.crossing.extend(crossing);
-    }
-}
-
-/// Fewest crossing points that make an obstacle: one or two may be mismatches.
-const LEAST_POINTS: usize = 3;
-/// Least share of a block's points that must cross: a mismatched patch does not fill a block.
-const LEAST_SHARE: f64 = 0.1;
-
-/// The nearest obstacle: of all blocks of which at least three points and 10 % cross the window,
-/// the one whose median looming is largest.
-///
-/// Its σ is that of the block's median point, not divided by the number of points, because
-/// neighbours share their noise.
-pub fn nearest(blocks: &mut [Neighbourhood]) -> Option<TimeToImpact> {
-    let by_looming = |a: &TimeToImpact, b: &TimeToImpact| a.looming.value().total_cmp(&b.looming.value());
-    blocks
-        .iter_mut()
-        .filter(|block| {
-            let count = block.crossing.len();
-            count >= LEAST_POINTS && count as f64 >= LEAST_SHARE * block.seen as f64
-        })
-        .filter_map(|block| upper_median(&mut block.crossing, by_looming))
-        .max_by(by_looming)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,18 +86,6 @@ mod tests {
         assert_eq!(impact(0.01, 0.02).interval95_s().unwrap().1, f64::INFINITY);
         assert_eq!(impact(-0.01, 0.02).seconds(), None);
         assert_eq!(impact(-0.1, 0.02).interval95_s(), None);
-    }
-
-    fn block(loomings: &[f64], seen: usize) -> Neighbourhood {
-        Neighbourhood { crossing: loomings.iter().map(|&l| impact(l, 0.01)).collect(), seen }
-    }
-
-    #[test]
-    fn single_points_make_no_obstacle() {
-        let mut blocks = vec![block(&[9.0, 9.0], 2), block(&[8.0, 8.0, 8.0], 100)];
-        assert_eq!(nearest(&mut blocks), None);
-        blocks.extend([block(&[0.4, 0.6, 0.5], 5), block(&[0.1, 0.2, 0.3], 3)]);
-        assert_eq!(nearest(&mut blocks).unwrap().looming.value(), 0.5);
     }
 
     #[test]

@@ -2,7 +2,9 @@
 
 pub mod depth_velocity;
 pub mod impact;
+pub mod obstacle;
 mod rigid_prediction;
 
 pub use depth_velocity::DepthVelocity;
 pub use impact::TimeToImpact;
+pub use obstacle::{NoObstacle, Obstacle};

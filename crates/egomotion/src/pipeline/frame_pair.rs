@@ -3,16 +3,18 @@
 use std::time::Instant;
 
 use super::config::{Approach, Config, Method, Observe};
-use super::maps::{MotionMaps, motion_maps, track_neighbourhoods};
+use super::contested::scene_motion;
+use super::groups::{Groups, MovingGroup};
+use super::maps::{MotionMaps, motion_maps, track_sightings};
+use super::moving::Moving;
 use super::solve::{Observed, solve};
 use super::stereo::{StageTimes, Unanswered};
 use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood, robust_start};
 use crate::estimate::systematic::common_errors;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Grid, StereoRig, Twist};
-use crate::motion::TimeToImpact;
 use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
-use crate::motion::impact::nearest;
+use crate::motion::obstacle::{Belief, NoObstacle, Obstacle, nearest};
 use crate::observe::flow::{Camera, FlowPair, FlowSpace, rigid_flow};
 use crate::observe::row_disagreement::row_disagreement;
 use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};
@@ -48,7 +50,8 @@ pub(super) struct FramePair<'a> {
 pub(super) struct PairResult {
     pub(super) motion: Result<MotionEstimate, Unanswered>,
     pub(super) row_disagreement_px: Option<f64>,
-    pub(super) impact: Option<TimeToImpact>,
+    pub(super) obstacle: Result<Obstacle, NoObstacle>,
+    pub(super) moving: Vec<MovingGroup>,
     pub(super) flow: Option<FlowField>,
     pub(super) maps: Option<MotionMaps>,
     /// The corners that were followed, in the later frame.
@@ -132,12 +135,16 @@ impl FramePair<'_> {
         Hints { shift, motion, mask: self.mask }
     }
 
-    /// The motion of most tracks.
+    /// The motion of most tracks, or of those that go on as before where a body holds most.
     fn rough(&self, tracks: &[StereoTrack], prior: Option<&Twist>) -> Result<Twist, Unsolvable> {
         let own = &self.config.maximum_likelihood;
         let options = &MaximumLikelihoodOptions { seed: own.seed ^ self.config.seed, ..*own };
-        let start = robust_start(tracks, self.rig, prior, options)?;
-        self.refined(tracks, &start)
+        let of_most = |tracks: &[StereoTrack]| {
+            let start = robust_start(tracks, self.rig, prior, options)?;
+            self.refined(tracks, &start)
+        };
+        let found = of_most(tracks)?;
+        Ok(prior.map_or(found, |prior| scene_motion(tracks, self.rig, found, prior, of_most)))
     }
 
     fn refined(&self, tracks: &[StereoTrack], start: &Twist) -> Result<Twist, Unsolvable> {
@@ -155,13 +162,16 @@ impl FramePair<'_> {
             solve(&Observed::Sparse(tracks), self.rig, &rough?, self.config)
         });
         let rows = row_disagreement(&self.before.images, tracks, self.rig);
-        let impact = self.rigid(tracks, motion.as_ref().ok(), rows).and_then(|rigid| {
-            nearest(&mut track_neighbourhoods(tracks, &rigid, self.rig, self.config, self.dt_s()))
+        let rigid = self.rigid(tracks, motion.as_ref().ok(), rows);
+        let obstacle = rigid.ok_or(NoObstacle::NothingMeasured).and_then(|rigid| {
+            let mut seen = track_sightings(tracks, &rigid, self.rig, self.config, self.dt_s());
+            nearest(&mut seen, (self.rig.width_px, self.rig.height_px), &Belief::SPARSE)
         });
         PairResult {
             motion: motion.map_err(Unanswered::from),
             row_disagreement_px: rows,
-            impact,
+            obstacle,
+            moving: Vec::new(),
             flow: None,
             maps: None,
             corners: Vec::new(),
@@ -178,7 +188,8 @@ impl FramePair<'_> {
         let nothing = |why| PairResult {
             motion: Err(why),
             row_disagreement_px: None,
-            impact: None,
+            obstacle: Err(NoObstacle::NothingMeasured),
+            moving: Vec::new(),
             flow: None,
             maps: None,
             corners: Vec::new(),
@@ -203,15 +214,26 @@ impl FramePair<'_> {
             solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config)
         });
         let rows = row_disagreement(&self.before.images, tracks, self.rig);
-        let (maps, mut seen) = timed(&mut stages.maps_ms, || {
+        let (maps, obstacle, moving) = timed(&mut stages.maps_ms, || {
             let rigid = self.rigid(tracks, motion.as_ref().ok(), rows);
-            let images = (&self.before.images, &self.after.images);
-            motion_maps(&pair, images, rigid.as_ref(), self.config, self.dt_s())
+            let groups = rigid.as_ref().zip(motion.as_ref().ok()).map(|(rigid, still)| {
+                let moving = Moving::find(&pair, (&self.before.images, &self.after.images), rigid);
+                let predict = |tracks: &[_], motion: &_| self.rigid(tracks, Some(motion), rows);
+                Groups::find(&pair, moving, self.config, still, self.dt_s(), predict)
+            });
+            let (maps, mut seen) =
+                motion_maps(&pair, rigid.as_ref(), groups.as_ref(), self.config, self.dt_s());
+            // Without a motion nobody knows what will cross the window.
+            let obstacle = rigid
+                .ok_or(NoObstacle::NothingMeasured)
+                .and_then(|_| nearest(&mut seen, pair.flow.size(), &Belief::DENSE));
+            (maps, obstacle, groups.map_or_else(Vec::new, Groups::into_groups))
         });
         PairResult {
             motion: motion.map_err(Unanswered::from),
             row_disagreement_px: rows,
-            impact: nearest(&mut seen),
+            obstacle,
+            moving,
             maps: Some(maps),
             flow: Some(flow),
             corners: Vec::new(),

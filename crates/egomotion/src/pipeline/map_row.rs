@@ -6,7 +6,7 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::config::{Approach, Config, Method};
-use super::moving::Moving;
+use super::groups::Groups;
 use crate::geometry::{Gaussian, StereoRig};
 use crate::motion::DepthVelocity;
 use crate::motion::depth_velocity::{self, RigidPrediction, contradict};
@@ -19,7 +19,7 @@ use crate::observe::dispatch::vectorised;
 pub(super) struct Scene<'a> {
     pub(super) pair: &'a DensePair<'a>,
     pub(super) rigid: Option<&'a RigidPrediction<'a>>,
-    pub(super) moving: Option<&'a Moving>,
+    pub(super) groups: Option<&'a Groups<'a>>,
     pub(super) config: &'a Config,
     pub(super) dt_s: f64,
 }
@@ -86,6 +86,9 @@ impl MapRow {
                     self.observe(scene, u, v);
                 }
                 unless_moving(rigid, rays, &self.disparities, &self.sigma, &mut self.velocity);
+                if let Some(groups) = scene.groups {
+                    self.follow(groups, rays, v);
+                }
             }
         }
         loomings(&self.velocity, dt_s, &mut self.looming, out);
@@ -93,6 +96,9 @@ impl MapRow {
             Some(rigid) => {
                 let when = (&config.window, dt_s);
                 crossings(rigid, rays, when, &self.velocity[0], &self.looming[0], &mut self.crosses);
+                if let Some(groups) = scene.groups {
+                    self.cross_alone(groups, rays, when, v);
+                }
             }
             None => self.crosses.fill(false),
         }
@@ -104,13 +110,55 @@ impl MapRow {
         let pair = scene.pair;
         self.disparities[0][u] = pair.rig.disparity_from_shift(f64::from(pair.before.shift.row(v)[u]));
         self.sigma[u] = f64::from(pair.before.sigma.row(v)[u]);
-        match scene.moving.and_then(|moving| moving.disparities(pair, u, v)) {
+        match scene.groups.and_then(|groups| groups.moving.disparities(pair, u, v)) {
             // Then the rigid motion says nothing.
             Some(own) => {
                 self.sigma[u] = f64::NAN;
                 self.set_disparities(u, own);
             }
             None => self.set_disparities(u, pair.disparities(u, v)),
+        }
+    }
+
+    /// The pixels of bodies that move by themselves move as their bodies do.
+    fn follow(&mut self, groups: &Groups<'_>, rays: Rays<'_>, v: usize) {
+        let bf = rays.rig.depth_disparity_product();
+        for u in 0..self.width() {
+            let Some(body) = groups.body(u, v) else { continue };
+            let [d, variance, later, later_variance, shared] =
+                self.disparities.each_ref().map(|plane| plane[u]);
+            let xyd = Vector3::new(rays.at(u).x, rays.at(u).y, d);
+            if later.is_nan() {
+                // Disparity is a guess: the body's motion must do, as the scene's does elsewhere.
+                let own = body.rigid.as_ref().and_then(|rigid| rigid.depth_velocity(&xyd, self.sigma[u]));
+                if own.is_some_and(|own| !own.z_vz.cov.m22.is_nan()) {
+                    self.set_velocity(u, own);
+                }
+                continue;
+            }
+            let cov = Matrix2::new(variance, shared, shared, later_variance);
+            let measured =
+                DepthVelocity::from_disparities(&Gaussian { mean: Vector2::new(d, later), cov }, bf);
+            if let Some(own) = body.depth_velocity(&measured, &xyd, variance) {
+                self.set_velocity(u, Some(own));
+            } else if groups.moving.is_moving(u, v) {
+                self.set_velocity(u, Some(body.scaled(&measured)));
+            }
+        }
+    }
+
+    /// Whether pixels that move by themselves cross the window: as their bodies move, and never where they make none.
+    fn cross_alone(&mut self, groups: &Groups<'_>, rays: Rays<'_>, when: (&VehicleWindow, f64), v: usize) {
+        for u in 0..self.width() {
+            let Some(body) = groups.body(u, v) else {
+                self.crosses[u] &= !groups.moving.is_moving(u, v);
+                continue;
+            };
+            if let Some(rigid) = &body.rigid {
+                let own = (&self.velocity[0][u..=u], &self.looming[0][u..=u]);
+                let ray = Rays { start: (rays.at(u).x, rays.start.1), ..rays };
+                crossings(rigid, ray, when, own.0, own.1, &mut self.crosses[u..=u]);
+            }
         }
     }
 
@@ -137,11 +185,11 @@ impl MapRow {
         self.sigma.len()
     }
 
-    /// Of pixel `u`, if it has an answer: its time to impact if it will cross the window.
-    pub(super) fn seen(&self, u: usize) -> Option<Option<TimeToImpact>> {
+    /// Of pixel `u`, if it has an answer: its time to impact, and whether it will cross the window.
+    pub(super) fn seen(&self, u: usize) -> Option<(TimeToImpact, bool)> {
         let [looming, variance] = &self.looming;
-        let impact = || TimeToImpact { looming: Gaussian::scalar(looming[u], variance[u]) };
-        (!self.velocity[1][u].is_nan()).then(|| self.crosses[u].then(impact))
+        let impact = TimeToImpact { looming: Gaussian::scalar(looming[u], variance[u]) };
+        (!looming[u].is_nan()).then(|| (impact, self.crosses[u]))
     }
 }
 

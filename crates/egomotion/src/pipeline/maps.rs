@@ -3,14 +3,14 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::config::{Config, Method};
+use super::config::Config;
+use super::groups::Groups;
 use super::map_row::{MapRow, Scene};
-use super::moving::Moving;
-use crate::estimate::Blocks;
-use crate::geometry::{Field, Gaussian, Grid, StereoRig};
+use crate::geometry::{Cells, Field, Gaussian, Grid, StereoRig};
+use crate::motion::TimeToImpact;
 use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
-use crate::motion::impact::{Neighbourhood, TimeToImpact};
-use crate::observe::{DensePair, StereoPyramid, StereoTrack};
+use crate::motion::obstacle::{Belief, Sightings};
+use crate::observe::{DensePair, StereoTrack};
 
 /// Per-pixel results on the pixel grid of the earlier frame; missing pixels are NaN.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,72 +41,53 @@ impl MotionMaps {
     }
 }
 
-/// Side of the blocks in which dense points make an obstacle, in pixels.
-const DENSE_OBSTACLE_PX: f64 = 32.0;
-/// The same for tracks, which are about thirty pixels apart.
-const SPARSE_OBSTACLE_PX: f64 = 96.0;
-
-/// VZ and time to impact of every pixel, and the nearest obstacle's points by block.
+/// VZ and time to impact of every pixel, and what was seen for the nearest obstacle in each cell of
+/// [`Belief::DENSE`].
 ///
 /// With `dcce` and `dv` VZ is that method's own measurement at each pixel; with the others it is
 /// the rigid scene's, except where flow or the measured change of disparity contradicts it: there it
-/// follows from the change of disparity. `images` are the two frames.
+/// follows from the motion of the group that it belongs to, or else from the change of disparity.
 pub fn motion_maps(
     pair: &DensePair<'_>,
-    images: (&StereoPyramid, &StereoPyramid),
     rigid: Option<&RigidPrediction<'_>>,
+    groups: Option<&Groups<'_>>,
     config: &Config,
     dt_s: f64,
-) -> (MotionMaps, Vec<Neighbourhood>) {
+) -> (MotionMaps, Vec<Sightings>) {
     let (width, height) = pair.flow.size();
-    let blocks = Blocks::over(pair.rig, DENSE_OBSTACLE_PX);
-    let own = matches!(config.method, Method::Dcce | Method::Dv);
-    let moving = rigid.filter(|_| !own).map(|rigid| Moving::find(pair, images, rigid));
-    let scene = Scene { pair, rigid, moving: moving.as_ref(), config, dt_s };
+    let cell_px = Belief::DENSE.cell_px;
+    let scene = Scene { pair, rigid, groups, config, dt_s };
     let mut planes: [Grid<f32>; 4] = std::array::from_fn(|_| Grid::filled(width, height, 0.0));
     let [vz, sigma, looming, looming_sigma] =
-        planes.each_mut().map(|plane| plane.values_mut().par_chunks_mut(width.max(1)));
-    let rows: Vec<Vec<(usize, Neighbourhood)>> = (vz, sigma, looming, looming_sigma)
+        planes.each_mut().map(|plane| plane.values_mut().par_chunks_mut((width * cell_px).max(1)));
+    let strips: Vec<Vec<Sightings>> = (vz, sigma, looming, looming_sigma)
         .into_par_iter()
         .enumerate()
         .map_init(
             || MapRow::new(width),
-            |row, (v, (vz, sigma, looming, looming_sigma))| {
-                row.fill(&scene, v, [vz, sigma, looming, looming_sigma]);
-                neighbourhoods(row, pair.rig, &blocks, v)
+            |row, (strip, (vz, sigma, looming, looming_sigma))| {
+                let rows = vz.chunks_mut(width).zip(sigma.chunks_mut(width));
+                let rates = looming.chunks_mut(width).zip(looming_sigma.chunks_mut(width));
+                let mut seen = vec![Sightings::default(); width.div_ceil(cell_px)];
+                for (v, ((vz, sigma), (looming, looming_sigma))) in rows.zip(rates).enumerate() {
+                    row.fill(&scene, strip * cell_px + v, [vz, sigma, looming, looming_sigma]);
+                    for u in 0..width {
+                        if let Some((impact, crosses)) = row.seen(u) {
+                            seen[u / cell_px].add(impact, crosses);
+                        }
+                    }
+                }
+                seen
             },
         )
         .collect();
-    let mut seen = vec![Neighbourhood::default(); blocks.count()];
-    for (block, part) in rows.into_iter().flatten() {
-        seen[block].seen += part.seen;
-        seen[block].crossing.extend(part.crossing);
-    }
+    let seen = strips.into_iter().flatten().collect();
     let [vz, sigma, looming, looming_sigma] = planes;
     let fields = |a, b| rayon::join(|| Field::from_grid(a), || Field::from_grid(b));
     let ((depth_velocity, depth_velocity_sigma), (looming, looming_sigma)) =
         rayon::join(|| fields(vz, sigma), || fields(looming, looming_sigma));
     let maps = MotionMaps { depth_velocity, depth_velocity_sigma, looming, looming_sigma };
     (maps, seen)
-}
-
-/// The points of row `v` by block.
-fn neighbourhoods(row: &MapRow, rig: &StereoRig, blocks: &Blocks, v: usize) -> Vec<(usize, Neighbourhood)> {
-    let mut seen: Vec<(usize, Neighbourhood)> = Vec::new();
-    for u in 0..row.width() {
-        let Some(crossing) = row.seen(u) else { continue };
-        let (x, y) = rig.image_from_pixel(u as f64, v as f64);
-        let block = blocks.index(x, y);
-        match seen.last_mut() {
-            Some((last, points)) if *last == block => points.add(crossing),
-            _ => {
-                let mut points = Neighbourhood::default();
-                points.add(crossing);
-                seen.push((block, points));
-            }
-        }
-    }
-    seen
 }
 
 /// Whether a point will pass through the vehicle's window.
@@ -124,27 +105,30 @@ fn crosses(
     })
 }
 
-/// The nearest obstacle's points among tracks, by block.
-pub fn track_neighbourhoods(
+/// What tracks show of the nearest obstacle, in each cell of [`Belief::SPARSE`].
+pub fn track_sightings(
     tracks: &[StereoTrack],
     rigid: &RigidPrediction<'_>,
     rig: &StereoRig,
     config: &Config,
     dt_s: f64,
-) -> Vec<Neighbourhood> {
-    let blocks = Blocks::over(rig, SPARSE_OBSTACLE_PX);
-    let mut seen = vec![Neighbourhood::default(); blocks.count()];
+) -> Vec<Sightings> {
+    let (width, height) = (rig.width_px, rig.height_px);
+    let cells = Cells::over((width, height), Belief::SPARSE.cell_px);
+    let mut seen = vec![Sightings::default(); cells.count()];
+    // The conversion takes what is negative to zero.
+    let pixel = |c: f64, n: usize| (c.round() as usize).min(n.saturating_sub(1));
     for track in tracks {
         let xyd = &track.before.mean;
         let measured = depth_velocity::dv_discrete(track, rig.depth_disparity_product());
         let predicted = rigid.depth_velocity(xyd, track.before.sigma(2));
-        let Some(velocity) = rigid_unless_moving(Some(measured), predicted) else { continue };
-        let impact = velocity.looming(dt_s).map(|looming| TimeToImpact { looming });
-        let crossing = rig
-            .point(xyd)
-            .zip(impact)
-            .filter(|(before, impact)| crosses(rigid, before, impact, config, dt_s));
-        seen[blocks.index(xyd.x, xyd.y)].add(crossing.map(|(_, impact)| impact));
+        let velocity = rigid_unless_moving(Some(measured), predicted);
+        let looming = velocity.and_then(|velocity| velocity.looming(dt_s));
+        let Some((before, looming)) = rig.point(xyd).zip(looming) else { continue };
+        let impact = TimeToImpact { looming };
+        let (u, v) = rig.pixel_from_image(xyd.x, xyd.y);
+        let cell = cells.index(pixel(u, width), pixel(v, height));
+        seen[cell].add(impact, crosses(rigid, &before, &impact, config, dt_s));
     }
     seen
 }

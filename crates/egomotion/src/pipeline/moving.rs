@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::geometry::Gaussian;
+use crate::geometry::{Cells, Gaussian};
 use crate::motion::depth_velocity::RigidPrediction;
 use crate::observe::temporal_disparity::{Seen, disparity_change};
 use crate::observe::{DensePair, StereoPyramid};
@@ -17,17 +17,18 @@ const SAME_SURFACE: f64 = 0.05;
 /// Cells of the image that do not move with the rigid scene.
 #[derive(Debug, Clone)]
 pub(super) struct Moving {
-    columns: usize,
-    rows: usize,
-    cells: Vec<Cell>,
+    layout: Cells,
+    /// `None` where nothing moves by itself.
+    cells: Vec<Option<Cell>>,
 }
 
 /// What was found of one cell.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Cell {
-    moves: bool,
-    /// d, and d′/d − 1 with its variance.
-    change: Option<(f64, Gaussian<1>)>,
+    /// The disparity of what moves there.
+    disparity: f64,
+    /// d′/d − 1 with its variance, where the patch was found again in all four images.
+    change: Option<Gaussian<1>>,
 }
 
 impl Moving {
@@ -37,14 +38,45 @@ impl Moving {
         images: (&StereoPyramid, &StereoPyramid),
         rigid: &RigidPrediction<'_>,
     ) -> Self {
-        let (width, height) = pair.flow.size();
-        let (columns, rows) = (width.div_ceil(CELL_PX), height.div_ceil(CELL_PX));
-        let cells = (0..rows * columns)
+        let layout = Cells::over(pair.flow.size(), CELL_PX);
+        let cells = (0..layout.count())
             .into_par_iter()
-            .with_min_len(columns)
-            .map(|i| cell(pair, images, rigid, (i % columns * CELL_PX, i / columns * CELL_PX)))
+            .with_min_len(layout.columns().max(1))
+            .map(|i| cell(pair, images, rigid, layout.corner(i)))
             .collect();
-        Self { columns, rows, cells }
+        Self { layout, cells }
+    }
+
+    /// How the cells lie in the image.
+    pub(super) fn layout(&self) -> &Cells {
+        &self.layout
+    }
+
+    /// The cell of a pixel.
+    #[inline(always)]
+    pub(super) fn index(&self, u: usize, v: usize) -> usize {
+        v / CELL_PX * self.layout.columns() + u / CELL_PX
+    }
+
+    /// The disparity of what moves by itself in a cell; `None` if nothing does.
+    pub(super) fn disparity(&self, cell: usize) -> Option<f64> {
+        self.cells[cell].map(|cell| cell.disparity)
+    }
+
+    /// Whether a pixel lies in a cell that moves by itself.
+    #[inline(always)]
+    pub(super) fn is_moving(&self, u: usize, v: usize) -> bool {
+        self.cells[self.index(u, v)].is_some()
+    }
+
+    /// Whether what moves in a cell was found again in all four images.
+    pub(super) fn is_confirmed(&self, cell: usize) -> bool {
+        self.cells[cell].is_some_and(|cell| cell.change.is_some())
+    }
+
+    /// Whether two disparities may be those of one surface, seen by neighbours.
+    pub(super) fn same_surface(a: f64, b: f64) -> bool {
+        (a - b).abs() < SAME_SURFACE * a.max(b)
     }
 
     /// d and d′ of a pixel in a cell that moves; `Some(None)` where they are not known, `None` elsewhere.
@@ -54,13 +86,11 @@ impl Moving {
         u: usize,
         v: usize,
     ) -> Option<Option<Gaussian<2>>> {
-        let (column, row) = (u / CELL_PX, v / CELL_PX);
-        self.cells[row * self.columns + column].moves.then(|| {
+        let cell = self.index(u, v);
+        self.cells[cell].is_some().then(|| {
             let maps = pair.disparities(u, v);
             match pair.disparity(u, v) {
-                Some(d) => {
-                    self.ratio(d.0, column, row).map_or(maps, |ratio| Some(joint(d, &ratio, maps.as_ref())))
-                }
+                Some(d) => self.ratio(d.0, cell).map_or(maps, |ratio| Some(joint(d, &ratio, maps.as_ref()))),
                 None => maps,
             }
         })
@@ -69,12 +99,16 @@ impl Moving {
     /// d′/d − 1 of the surface at disparity `d` around a cell.
     ///
     /// Windows of neighbours overlap: their mean is taken to be no surer than they are.
-    fn ratio(&self, d: f64, column: usize, row: usize) -> Option<Gaussian<1>> {
+    fn ratio(&self, d: f64, cell: usize) -> Option<Gaussian<1>> {
+        let columns = self.layout.columns();
+        let (column, row, rows) = (cell % columns, cell / columns, self.layout.count() / columns);
         let (mut sum, mut weights, mut count) = (0.0, 0.0, 0.0);
-        for r in row.saturating_sub(1)..(row + 2).min(self.rows) {
-            for c in column.saturating_sub(1)..(column + 2).min(self.columns) {
-                let Some((there, change)) = &self.cells[r * self.columns + c].change else { continue };
-                if (there / d - 1.0).abs() < SAME_SURFACE {
+        for r in row.saturating_sub(1)..(row + 2).min(rows) {
+            for c in column.saturating_sub(1)..(column + 2).min(columns) {
+                let Some(Cell { disparity, change: Some(change) }) = self.cells[r * columns + c] else {
+                    continue;
+                };
+                if Self::same_surface(disparity, d) {
                     let weight = change.variance().recip();
                     sum += weight * change.value();
                     weights += weight;
@@ -111,7 +145,7 @@ fn cell(
     (before, after): (&StereoPyramid, &StereoPyramid),
     rigid: &RigidPrediction<'_>,
     (u, v): (usize, usize),
-) -> Cell {
+) -> Option<Cell> {
     let (width, height) = pair.flow.size();
     let (mut apart, mut together) = (0, 0);
     let mut best: Option<(f64, (usize, usize))> = None;
@@ -131,18 +165,19 @@ fn cell(
             }
         }
     }
-    let Some((_, (u, v))) = best.filter(|_| apart > together) else { return Cell::default() };
-    Cell { moves: true, change: change_at(pair, (before, after), rigid, (u, v)) }
+    let (_, (u, v)) = best.filter(|_| apart > together)?;
+    let (disparity, _) = pair.disparity(u, v)?;
+    Some(Cell { disparity, change: change_at(pair, (before, after), rigid, (u, v), disparity) })
 }
 
-/// d and the relative change of d at a pixel.
+/// The relative change of `d` at a pixel.
 fn change_at(
     pair: &DensePair<'_>,
     (before, after): (&StereoPyramid, &StereoPyramid),
     rigid: &RigidPrediction<'_>,
     (u, v): (usize, usize),
-) -> Option<(f64, Gaussian<1>)> {
-    let (d, _) = pair.disparity(u, v)?;
+    d: f64,
+) -> Option<Gaussian<1>> {
     let flow = pair.flow.get(u, v)?.mean;
     let seen =
         Seen { at: (u as f64, v as f64), shift: pair.rig.shift_from_disparity(d), flow: (flow.x, flow.y) };
@@ -151,7 +186,7 @@ fn change_at(
     let by_motion = rigid.moved(&nalgebra::Vector3::new(x, y, d)).map(|moved| moved.z - d);
     let expected: Vec<f64> = by_maps.into_iter().chain([0.0]).chain(by_motion).collect();
     let change = disparity_change(before, after, &seen, &expected)?;
-    Some((d, Gaussian::scalar(change.value() / d, change.variance() / (d * d))))
+    Some(Gaussian::scalar(change.value() / d, change.variance() / (d * d)))
 }
 
 #[cfg(test)]

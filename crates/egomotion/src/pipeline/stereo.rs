@@ -4,10 +4,11 @@ use thiserror::Error;
 
 use super::config::{Config, ConfigError, Observe};
 use super::frame_pair::{FramePair, Reference, timed};
+use super::groups::MovingGroup;
 use super::maps::MotionMaps;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Field, Grid, Image, RigError, StereoRig, Twist};
-use crate::motion::TimeToImpact;
+use crate::motion::{NoObstacle, Obstacle, TimeToImpact};
 use crate::observe::flow::FlowSpace;
 use crate::observe::{DisparityMap, DisparityMatcher, FlowField, StereoPyramid};
 
@@ -102,12 +103,21 @@ pub struct FrameMotion {
     /// By how much matches of left and right lie on different rows in the reference frame, in pixels:
     /// how well the pair is rectified.
     pub row_disagreement_px: Option<f64>,
-    /// Time to impact of the nearest obstacle in the vehicle's window.
-    pub impact: Option<TimeToImpact>,
+    /// The nearest obstacle that will pass through the vehicle's window, or why there is none.
+    pub obstacle: Result<Obstacle, NoObstacle>,
+    /// What moves by itself, the largest group first; found when observing densely.
+    pub moving: Vec<MovingGroup>,
     /// The maps, when observing densely.
     pub dense: Option<DenseResults>,
     /// Where the time went.
     pub stages: StageTimes,
+}
+
+impl FrameMotion {
+    /// Time to impact of the nearest obstacle.
+    pub fn impact(&self) -> Option<TimeToImpact> {
+        self.obstacle.as_ref().ok().map(|obstacle| obstacle.impact)
+    }
 }
 
 /// Why a pipeline cannot be built.
@@ -197,7 +207,8 @@ impl StereoMotion {
             dt_s: self.reference.as_ref().map(|r| time_s - r.time_s),
             motion: Err(why),
             row_disagreement_px: None,
-            impact: None,
+            obstacle: Err(NoObstacle::NothingMeasured),
+            moving: Vec::new(),
             dense: None,
             stages: StageTimes::default(),
         }
@@ -256,7 +267,8 @@ impl StereoMotion {
             dt_s: Some(dt_s),
             motion: result.motion,
             row_disagreement_px: result.row_disagreement_px,
-            impact: result.impact,
+            obstacle: result.obstacle,
+            moving: result.moving,
             dense: result
                 .flow
                 .zip(result.maps)

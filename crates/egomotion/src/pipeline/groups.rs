@@ -1,0 +1,313 @@
+//! What moves by itself: connected cells that contradict the rigid scene, each group with a motion of its own.
+
+use std::cmp::Reverse;
+
+use nalgebra::{Vector3, Vector6};
+
+use super::config::Config;
+use super::moving::Moving;
+use super::solve::Solver;
+use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, robust_start};
+use crate::estimate::{Blocks, MotionEstimate, median};
+use crate::geometry::{Gaussian, PixelBounds, StereoRig, upper_median};
+use crate::motion::TimeToImpact;
+use crate::motion::depth_velocity::{DepthVelocity, RigidPrediction, contradict};
+use crate::observe::{DensePair, StereoTrack};
+
+/// Fewest cells of a group: single mismatches are none.
+const LEAST_CELLS: usize = 12;
+/// Least share of them whose patch was found again in all four images: wrong flow and hidden places are not.
+const LEAST_CONFIRMED: f64 = 0.3;
+/// Every so many pixels in both directions observe the group's motion.
+const STEP: usize = 2;
+/// Side of the blocks of pixels that count as independent: a group has few of the scene's larger ones.
+const BLOCK_PX: f64 = 24.0;
+/// χ²₆(0.999): motions that differ by less are the same.
+const ALIKE: f64 = 22.46;
+/// Median of χ²₁.
+const MEDIAN_CHI2: f64 = 0.454_94;
+
+/// Something that moves by itself, between two frames.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MovingGroup {
+    /// Pixels of the earlier left image that it covers.
+    pub pixels: usize,
+    /// The least rectangle around them.
+    pub bounds: PixelBounds,
+    /// Their mean (u, v).
+    pub centre_px: (f64, f64),
+    /// Median depth Z at the earlier frame, in metres.
+    pub depth_m: f64,
+    /// Its motion relative to the left camera, φ over the interval as that of the scene; `None` where its pixels
+    /// determine none.
+    pub motion: Option<MotionEstimate>,
+    /// VZ at its centre by its motion, in metres per interval; the median of what was measured where the motion is
+    /// not known completely.
+    pub depth_velocity: Gaussian<1>,
+    /// Time to impact of its centre; `None` where it gets behind the camera.
+    pub impact: Option<TimeToImpact>,
+}
+
+/// A group with what its pixels ask of it.
+#[derive(Debug)]
+pub(super) struct Body<'a> {
+    group: MovingGroup,
+    /// What its pixels do by its own motion, if that is known.
+    pub(super) rigid: Option<RigidPrediction<'a>>,
+    /// By how much its pixels scatter more than their variance says.
+    scale2: f64,
+}
+
+/// The moving cells of a pair of frames, and the groups they make.
+#[derive(Debug)]
+pub struct Groups<'a> {
+    pub(super) moving: Moving,
+    /// The group of each cell.
+    of_cell: Vec<Option<usize>>,
+    bodies: Vec<Body<'a>>,
+}
+
+impl<'a> Groups<'a> {
+    /// Group the moving cells, the largest group first; `still` is the rigid scene's motion, and `predict` makes of a group's motion what its pixels do.
+    pub(super) fn find(
+        pair: &DensePair<'_>,
+        moving: Moving,
+        config: &Config,
+        still: &MotionEstimate,
+        dt_s: f64,
+        predict: impl Fn(&[StereoTrack], &MotionEstimate) -> Option<RigidPrediction<'a>>,
+    ) -> Self {
+        let surface = |cell| moving.disparity(cell);
+        let joined = |a, b| surface(a).zip(surface(b)).is_some_and(|(a, b)| Moving::same_surface(a, b));
+        let mut regions = moving.layout().regions(|cell| surface(cell).is_some(), joined);
+        regions.retain(|region| is_believed(region, &moving));
+        regions.sort_by_key(|region| Reverse(region.len()));
+        let config = &Config { block_px: BLOCK_PX, ..config.clone() };
+        let mut groups = Self { of_cell: vec![None; moving.layout().count()], moving, bodies: Vec::new() };
+        for region in regions {
+            let sampled = Sampled::of(pair, &groups.moving, &region);
+            let motion = sampled.motion(pair.rig, config);
+            if motion.as_ref().is_some_and(|motion| is_still(motion, still)) {
+                continue;
+            }
+            let rigid = motion.filter(MotionEstimate::is_complete).and_then(|m| predict(&sampled.tracks, &m));
+            let Some(mut body) = sampled.body(pair.rig, motion, rigid, dt_s) else { continue };
+            let mut region = region;
+            region
+                .extend(body.rigid.as_ref().map_or_else(Vec::new, |rigid| groups.gaps(pair, &region, rigid)));
+            let layout = groups.moving.layout();
+            body.group.pixels = region.len() * layout.size_px().pow(2);
+            body.group.bounds = layout.bounds(&region).unwrap_or(body.group.bounds);
+            region.iter().for_each(|&cell| groups.of_cell[cell] = Some(groups.bodies.len()));
+            groups.bodies.push(body);
+        }
+        groups
+    }
+
+    /// Cells between those of a region in their row or column that may show its surface and move as it does:
+    /// where there is no texture, nothing contradicts the still world either.
+    fn gaps(&self, pair: &DensePair<'_>, region: &[usize], rigid: &RigidPrediction<'_>) -> Vec<usize> {
+        let layout = self.moving.layout();
+        let columns = layout.columns();
+        let transposed = |cell: usize| (cell % columns, cell / columns);
+        let mut rows = region.to_vec();
+        rows.sort_unstable();
+        let mut found = self.between(pair, &rows, rigid, 1, |a, b| a / columns == b / columns);
+        rows.sort_unstable_by_key(|&cell| transposed(cell));
+        found.extend(self.between(pair, &rows, rigid, columns, |a, b| a % columns == b % columns));
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// The fitting cells between consecutive ones of `sorted` in one `line`, which lie `step` apart there.
+    fn between(
+        &self,
+        pair: &DensePair<'_>,
+        sorted: &[usize],
+        rigid: &RigidPrediction<'_>,
+        step: usize,
+        line: impl Fn(usize, usize) -> bool,
+    ) -> Vec<usize> {
+        let fits = |cell: usize, ends: [usize; 2]| {
+            let surfaces = ends.map(|end| self.moving.disparity(end));
+            self.fits(pair, cell, rigid, |d| {
+                surfaces.iter().flatten().any(|&end| Moving::same_surface(d, end))
+            })
+        };
+        let ends = sorted.windows(2).map(|ends| [ends[0], ends[1]]).filter(|ends| line(ends[0], ends[1]));
+        ends.flat_map(|ends| (ends[0]..ends[1]).step_by(step).skip(1).filter(move |&cell| fits(cell, ends)))
+            .collect()
+    }
+
+    /// Whether the middle of a cell may show a surface, its disparity on it or only guessed, and its flow may be
+    /// that of a motion.
+    fn fits(
+        &self,
+        pair: &DensePair<'_>,
+        cell: usize,
+        rigid: &RigidPrediction<'_>,
+        surface: impl Fn(f64) -> bool,
+    ) -> bool {
+        let layout = self.moving.layout();
+        let ((left, top), (width, height)) = (layout.corner(cell), pair.flow.size());
+        let (u, v) = (left + layout.size_px() / 2, top + layout.size_px() / 2);
+        if self.of_cell[cell].is_some() || u >= width || v >= height {
+            return false;
+        }
+        let known = pair.before.shift.get(u, v).zip(pair.before.sigma.get(u, v)).zip(pair.displacement(u, v));
+        let Some(((shift, sigma), flow)) = known else { return false };
+        let d = pair.rig.disparity_from_shift(f64::from(shift));
+        let (x, y) = pair.rig.image_from_pixel(u as f64, v as f64);
+        (surface(d) || pair.disparity(u, v).is_none())
+            && !rigid.contradicts_flow(&Vector3::new(x, y, d), f64::from(sigma).powi(2), &flow)
+    }
+
+    /// The body that a pixel of a moving cell belongs to, if any.
+    #[inline(always)]
+    pub(super) fn body(&self, u: usize, v: usize) -> Option<&Body<'a>> {
+        self.bodies.get(self.of_cell[self.moving.index(u, v)]?)
+    }
+
+    /// The groups.
+    pub(super) fn into_groups(self) -> Vec<MovingGroup> {
+        self.bodies.into_iter().map(|body| body.group).collect()
+    }
+}
+
+/// Whether a region is large enough, and more than a patch of wrong flow.
+fn is_believed(region: &[usize], moving: &Moving) -> bool {
+    let confirmed = region.iter().filter(|&&cell| moving.is_confirmed(cell)).count();
+    region.len() >= LEAST_CELLS && confirmed as f64 >= LEAST_CONFIRMED * region.len() as f64
+}
+
+/// Whether a motion is known and yet not unlike the rigid scene's.
+fn is_still(motion: &MotionEstimate, still: &MotionEstimate) -> bool {
+    let apart =
+        Gaussian { mean: motion.theta.mean - still.theta.mean, cov: motion.theta.cov + still.theta.cov };
+    motion.is_complete() && apart.mahalanobis2(&Vector6::zeros()).is_some_and(|square| square < ALIKE)
+}
+
+impl Body<'_> {
+    /// Z and VZ by the body's own motion of a pixel with disparity (x, y, d) and the variance of d; `None` where
+    /// what was measured contradicts it.
+    pub(super) fn depth_velocity(
+        &self,
+        measured: &DepthVelocity,
+        xyd: &Vector3<f64>,
+        variance: f64,
+    ) -> Option<DepthVelocity> {
+        let predicted = self.rigid.as_ref()?.depth_velocity(xyd, variance.sqrt())?;
+        (!contradict(&self.scaled(measured), &predicted)).then_some(predicted)
+    }
+
+    /// A measurement with the scatter of the body's pixels.
+    pub(super) fn scaled(&self, measured: &DepthVelocity) -> DepthVelocity {
+        let Gaussian { mean, cov } = measured.z_vz;
+        DepthVelocity { z_vz: Gaussian { mean, cov: cov * self.scale2 } }
+    }
+}
+
+/// What the pixels of a region show.
+struct Sampled {
+    /// Where, in pixels.
+    places: Vec<(f64, f64)>,
+    /// d with its variance.
+    disparities: Vec<(f64, f64)>,
+    tracks: Vec<StereoTrack>,
+    /// (x, y, d), the variance of d, and what was measured of Z and VZ.
+    velocities: Vec<(Vector3<f64>, f64, DepthVelocity)>,
+}
+
+impl Sampled {
+    fn of(pair: &DensePair<'_>, moving: &Moving, region: &[usize]) -> Self {
+        let mut sampled =
+            Self { places: Vec::new(), disparities: Vec::new(), tracks: Vec::new(), velocities: Vec::new() };
+        let (width, height) = pair.flow.size();
+        let side = moving.layout().size_px();
+        let bf = pair.rig.depth_disparity_product();
+        for &cell in region {
+            let (left, top) = moving.layout().corner(cell);
+            let rows = (top + STEP / 2..(top + side).min(height)).step_by(STEP);
+            let pixels = rows
+                .flat_map(|v| (left + STEP / 2..(left + side).min(width)).step_by(STEP).map(move |u| (u, v)));
+            for (u, v) in pixels {
+                // A cell at the body's edge shows what is behind it as well.
+                let on_body = |d: &(f64, f64)| {
+                    moving.disparity(cell).is_some_and(|cell| Moving::same_surface(d.0, cell))
+                };
+                let Some(d) = pair.disparity(u, v).filter(on_body) else { continue };
+                sampled.places.push((u as f64, v as f64));
+                sampled.disparities.push(d);
+                sampled.tracks.extend(pair.stereo_track(u, v));
+                if let Some(both) = moving.disparities(pair, u, v).flatten() {
+                    let (x, y) = pair.rig.image_from_pixel(u as f64, v as f64);
+                    let velocity = DepthVelocity::from_disparities(&both, bf);
+                    sampled.velocities.push((Vector3::new(x, y, d.0), d.1, velocity));
+                }
+            }
+        }
+        sampled
+    }
+
+    /// The group; `None` where nothing was measured.
+    fn body<'a>(
+        &self,
+        rig: &StereoRig,
+        motion: Option<MotionEstimate>,
+        rigid: Option<RigidPrediction<'a>>,
+        dt_s: f64,
+    ) -> Option<Body<'a>> {
+        let count = self.places.len().max(1) as f64;
+        let mean = |of: fn(&(f64, f64)) -> f64| self.places.iter().map(of).sum::<f64>() / count;
+        let centre_px = (mean(|place| place.0), mean(|place| place.1));
+        let (d, variance) = upper_median(&mut self.disparities.clone(), |a, b| a.0.total_cmp(&b.0))?;
+        let (x, y) = rig.image_from_pixel(centre_px.0, centre_px.1);
+        let centre = Vector3::new(x, y, d);
+        let by_motion = rigid.as_ref().and_then(|rigid| rigid.depth_velocity(&centre, variance.sqrt()));
+        let by_vz = |a: &DepthVelocity, b: &DepthVelocity| a.vz().value().total_cmp(&b.vz().value());
+        let measured = || upper_median(&mut self.velocities.iter().map(|m| m.2).collect::<Vec<_>>(), by_vz);
+        let velocity = by_motion.or_else(measured)?;
+        let group = MovingGroup {
+            pixels: 0,
+            bounds: PixelBounds { u: 0, v: 0, width: 0, height: 0 },
+            centre_px,
+            depth_m: rig.depth(d)?,
+            motion,
+            depth_velocity: velocity.vz(),
+            impact: velocity.looming(dt_s).map(|looming| TimeToImpact { looming }),
+        };
+        let scale2 = rigid.as_ref().map_or(1.0, |rigid| self.scale2(rigid));
+        Some(Body { group, rigid, scale2 })
+    }
+
+    /// The motion of most of the pixels.
+    ///
+    /// Its covariance is itself estimated from few blocks: it is widened to that of Student's t with one degree of
+    /// freedom fewer than blocks, which with three blocks has none.
+    fn motion(&self, rig: &StereoRig, config: &Config) -> Option<MotionEstimate> {
+        let own = &config.maximum_likelihood;
+        let options = MaximumLikelihoodOptions { seed: own.seed ^ config.seed, ..*own };
+        let start = robust_start(&self.tracks, rig, None, &options).ok()?;
+        let mut found = Solver::new(rig, &start, config).likelihood(&self.tracks).ok()?;
+        let layout = Blocks::over(rig, config.block_px);
+        let mut blocks: Vec<usize> =
+            self.tracks.iter().map(|track| layout.index(track.before.mean.x, track.before.mean.y)).collect();
+        blocks.sort_unstable();
+        blocks.dedup();
+        let freedom = blocks.len() as f64 - 1.0;
+        found.theta.cov *= if freedom > 2.0 { freedom / (freedom - 2.0) } else { f64::INFINITY };
+        found.known().ok()
+    }
+
+    /// Squared scale of the measured VZ about those of the body's motion, in units of their variance; at least 1.
+    fn scale2(&self, rigid: &RigidPrediction<'_>) -> f64 {
+        let square = |(xyd, variance, measured): &(Vector3<f64>, f64, DepthVelocity)| {
+            let predicted = rigid.depth_velocity(xyd, variance.sqrt())?;
+            Some((measured.vz().value() - predicted.vz().value()).powi(2) / measured.vz().variance())
+        };
+        let mut squares: Vec<f64> = self.velocities.iter().filter_map(square).collect();
+        // No square is NaN of nothing.
+        (median(&mut squares) / MEDIAN_CHI2).max(1.0)
+    }
+}
