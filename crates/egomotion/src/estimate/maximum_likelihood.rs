@@ -81,14 +81,36 @@ pub fn maximum_likelihood<M: Measurement>(
     blocks: Option<&Blocks>,
     kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
-    let mut search = Search::begin(observations, rig, start, kernel)?;
-    let stride = observations.len() / COARSE;
-    if stride > 1 {
-        let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
-        search = search.approach(&few, rig, kernel)?;
-    } else {
-        search = search.approach(observations, rig, kernel)?;
+    let stride = (observations.len() / COARSE).max(1);
+    let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
+    let found = maximise(observations, &few, rig, start, blocks, kernel);
+    if !(kernel.nu.is_finite() && kernel.fitted) {
+        return found;
     }
+    // Of few observations a mixture may see but some that happen to agree, and call the others outliers.
+    let astray = match &found {
+        Ok(found) => middle(&found.motion.phi(), &few, rig) > ASTRAY * middle(start, &few, rig),
+        Err(why) => *why == Unsolvable::NotConverged,
+    };
+    if astray {
+        return maximise(observations, &few, rig, start, blocks, &StudentT { fitted: false, ..*kernel });
+    }
+    found
+}
+
+/// An answer is not believed whose median of q is so many times that of the robust start.
+const ASTRAY: f64 = 1.5;
+
+/// The maximum near a start; `few` of the observations bring the iteration near its end.
+fn maximise<M: Measurement>(
+    observations: &[M],
+    few: &[M],
+    rig: &StereoRig,
+    start: &Twist,
+    blocks: Option<&Blocks>,
+    kernel: &StudentT,
+) -> Result<MaximumLikelihood, Unsolvable> {
+    let search = Search::begin(observations, rig, start, kernel)?.approach(few, rig, kernel)?;
     let (found, sums) = search.settle(observations, rig, blocks, kernel)?;
     finish(&found, &sums, observations.len(), blocks, kernel)
 }
@@ -160,7 +182,9 @@ impl Search {
             }
             let delta = direction(step, iteration < NEWTON)?;
             self.phi = Twist::from_vector(&(self.phi.vector() + delta));
-            if kernel.nu.is_finite() {
+            // Beside outliers a scale that follows the weights, which follow the scale, may shrink to nothing: it stays
+            // as it was found (the MM-estimator of Yohai 1987).
+            if kernel.nu.is_finite() && !self.mixture.has_outliers() {
                 self.scale2 = step.scale2().max(LEAST_SCALE2);
             }
             let moved = delta.dot(&(step.score.information * delta)).max(0.0).sqrt();
@@ -293,7 +317,7 @@ const NEAR: f64 = 7.8;
 const FITS: f64 = 1.5;
 
 /// The median of q at a motion.
-fn middle(phi: &Twist, sample: &[StereoTrack], rig: &StereoRig) -> f64 {
+fn middle<M: Measurement>(phi: &Twist, sample: &[M], rig: &StereoRig) -> f64 {
     let middle = median(&mut squares(sample, &At::new(*phi, rig)));
     if middle.is_nan() { f64::INFINITY } else { middle }
 }

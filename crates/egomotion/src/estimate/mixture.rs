@@ -28,7 +28,7 @@ const ITERATIONS: usize = 8;
 /// Outliers reach so many times the first scale at least.
 const LEAST_REACH: f64 = 10.0;
 /// Least and greatest share of outliers.
-const SHARE: (f64, f64) = (1e-3, 0.9);
+const SHARE: (f64, f64) = (1e-3, 0.7);
 
 /// The weights of residuals in units of their scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,6 +68,11 @@ impl Mixture {
         let inlier = self.inlier(q);
         let falling = f64::from(self.exponent) / distance - 0.5 * DIMENSION / (CORE + q);
         (student * inlier, 2.0 * (1.0 / distance + falling * (1.0 - inlier)))
+    }
+
+    /// Whether outliers have a share: then far residuals have no weight at all.
+    pub fn has_outliers(&self) -> bool {
+        self.odds > 0.0
     }
 
     /// Probability that a residual is no outlier.
