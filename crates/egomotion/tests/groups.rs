@@ -51,6 +51,21 @@ fn nothing_moves_by_itself_in_static_scenes() {
             }
         }
     }
+    // Larger images of a room full of depth edges.
+    let drive = Sequence::named("demo", Some((640, 480)), None, 1.0).unwrap();
+    let noise = SensorNoise::default().with_seed(5);
+    for k in (0..drive.frames() - 1).step_by(3) {
+        let frames = [k, k + 1].map(|k| {
+            let seen = noise.expose(&drive.view(k).unwrap().render(3), k as u64);
+            StereoFrame { time_s: drive.interval_s * k as f64, left: seen.left, right: seen.right }
+        });
+        let answer = second(drive.rig, frames);
+        pairs += 1;
+        with_groups += usize::from(!answer.moving.is_empty());
+        for group in &answer.moving {
+            println!("demo {k} {group:?}");
+        }
+    }
     println!("{with_groups} of {pairs}");
     assert!(with_groups * 20 <= pairs, "{with_groups} of {pairs}");
 }

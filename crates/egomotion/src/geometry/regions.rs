@@ -70,6 +70,25 @@ impl Cells {
         })
     }
 
+    /// The cells beside one, by an edge.
+    fn beside(&self, cell: usize) -> [Option<usize>; 4] {
+        let column = cell % self.columns;
+        [
+            (column > 0).then(|| cell - 1),
+            (column + 1 < self.columns).then_some(cell + 1),
+            cell.checked_sub(self.columns),
+            Some(cell + self.columns).filter(|&below| below < self.count()),
+        ]
+    }
+
+    /// Number of cells of a region that have all four neighbours in it.
+    pub fn enclosed(&self, region: &[usize]) -> usize {
+        let mut sorted = region.to_vec();
+        sorted.sort_unstable();
+        let inside = |cell: Option<usize>| cell.is_some_and(|cell| sorted.binary_search(&cell).is_ok());
+        region.iter().filter(|&&cell| self.beside(cell).into_iter().all(inside)).count()
+    }
+
     /// The connected regions of the cells that are `member`: neighbours by an edge belong together where they
     /// are `joined`, which must be symmetric. Regions in the order of their first cell.
     pub fn regions(
@@ -77,7 +96,7 @@ impl Cells {
         member: impl Fn(usize) -> bool,
         joined: impl Fn(usize, usize) -> bool,
     ) -> Vec<Vec<usize>> {
-        let (columns, count) = (self.columns, self.count());
+        let count = self.count();
         let mut open: Vec<bool> = (0..count).map(member).collect();
         let mut regions = Vec::new();
         for first in 0..count {
@@ -88,14 +107,7 @@ impl Cells {
             let mut next = 0;
             while let Some(&cell) = region.get(next) {
                 next += 1;
-                let column = cell % columns;
-                let beside = [
-                    (column > 0).then(|| cell - 1),
-                    (column + 1 < columns).then_some(cell + 1),
-                    cell.checked_sub(columns),
-                    Some(cell + columns).filter(|&below| below < count),
-                ];
-                for other in beside.into_iter().flatten() {
+                for other in self.beside(cell).into_iter().flatten() {
                     if open[other] && joined(cell, other) {
                         open[other] = false;
                         region.push(other);
@@ -130,6 +142,15 @@ mod tests {
         assert_eq!(cells.bounds(&regions[2]), bounds(8, 4, 10, 7));
         assert_eq!(cells.bounds(&[]), None);
         assert_eq!((cells.index(17, 10), cells.corner(14)), (14, (16, 8)));
+    }
+
+    #[test]
+    fn enclosed_cells_have_four_neighbours() {
+        let cells = Cells::over((20, 16), 4);
+        // A block of 4 × 3 cells at the left edge, and a row of 5.
+        let block: Vec<usize> = (0..3).flat_map(|row| (0..4).map(move |column| 5 * row + column)).collect();
+        assert_eq!(cells.enclosed(&block), 2);
+        assert_eq!(cells.enclosed(&[15, 16, 17, 18, 19]), 0);
     }
 
     #[test]

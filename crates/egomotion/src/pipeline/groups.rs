@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 
 use nalgebra::{Vector3, Vector6};
+use rayon::prelude::*;
 
 use super::config::Config;
 use super::moving::Moving;
@@ -16,6 +17,9 @@ use crate::observe::{DensePair, StereoTrack};
 
 /// Fewest cells of a group: single mismatches are none.
 const LEAST_CELLS: usize = 12;
+/// Fewest of them that have all four neighbours in the group: at depth edges wrong disparities make seams two or
+/// three cells wide.
+const LEAST_ENCLOSED: usize = 4;
 /// Least share of them whose patch was found again in all four images: wrong flow and hidden places are not.
 const LEAST_CONFIRMED: f64 = 0.3;
 /// Every so many pixels in both directions observe the group's motion.
@@ -85,14 +89,17 @@ impl<'a> Groups<'a> {
         regions.sort_by_key(|region| Reverse(region.len()));
         let config = &Config { block_px: BLOCK_PX, ..config.clone() };
         let mut groups = Self { of_cell: vec![None; moving.layout().count()], moving, bodies: Vec::new() };
-        for region in regions {
-            let sampled = Sampled::of(pair, &groups.moving, &region);
+        let moves = |region: &Vec<usize>| {
+            let sampled = Sampled::of(pair, &groups.moving, region);
             let motion = sampled.motion(pair.rig, config);
+            (sampled, motion)
+        };
+        let found: Vec<(Sampled, Option<MotionEstimate>)> = regions.par_iter().map(moves).collect();
+        for (mut region, (sampled, motion)) in regions.into_iter().zip(found) {
             if motion.as_ref().is_some_and(|motion| is_still(motion, still)) {
                 continue;
             }
             let rigid = motion.filter(MotionEstimate::is_complete).and_then(|m| predict(&sampled.tracks, &m));
-            let mut region = region;
             if let Some(rigid) = &rigid {
                 region.extend(groups.gaps(pair, &region, rigid));
             }
@@ -175,10 +182,12 @@ impl<'a> Groups<'a> {
     }
 }
 
-/// Whether a region is large enough, and more than a patch of wrong flow.
+/// Whether a region is large enough, and more than a patch of wrong flow or the seam of a depth edge.
 fn is_believed(region: &[usize], moving: &Moving) -> bool {
     let confirmed = region.iter().filter(|&&cell| moving.is_confirmed(cell)).count();
-    region.len() >= LEAST_CELLS && confirmed as f64 >= LEAST_CONFIRMED * region.len() as f64
+    region.len() >= LEAST_CELLS
+        && confirmed as f64 >= LEAST_CONFIRMED * region.len() as f64
+        && moving.layout().enclosed(region) >= LEAST_ENCLOSED
 }
 
 /// Whether a motion is known and yet not unlike the rigid scene's.
