@@ -241,7 +241,7 @@ choice!(EstimatorArg for EstimatorKind {
     Ls: "Least squares, all rows alike.",
     Lmeds: "Least median of squares.",
     Irls: "Reweighted least squares, rows weighted by their variance.",
-    Eiv: "The same without the bias of noisy gradients (method dcce alone).",
+    Eiv: "Least squares corrected for the bias of noisy gradients (method dcce alone).",
 });
 choice!(ObserveArg for Observe {
     Dense: "Disparity and flow of every pixel, with all maps.",

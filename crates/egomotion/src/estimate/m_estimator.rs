@@ -33,19 +33,6 @@ impl StudentT {
         if self.nu.is_infinite() { 1.0 } else { (self.nu + dimension) / (self.nu + q) }
     }
 
-    /// Squared scale to which normal residuals of variance 1 lead: E\[w(z²/s²) z²\] = s².
-    pub fn gaussian_scale2(&self) -> f64 {
-        // The trapezoid rule is exact to rounding for what decays so fast.
-        let moment = |s2: f64| {
-            let at = |i: i32| {
-                let z2 = (0.05 * f64::from(i)).powi(2);
-                self.weight(z2 / s2, 1.0) * z2 * (-0.5 * z2).exp()
-            };
-            0.05 * (-200..=200).map(at).sum::<f64>() / std::f64::consts::TAU.sqrt()
-        };
-        (0..60).fold(1.0, |s2, _| moment(s2))
-    }
-
     /// −2 ∂weight/∂q, which turns the weighted information into the score's true derivative.
     pub fn curvature(&self, q: f64, dimension: f64) -> f64 {
         if self.nu.is_infinite() {

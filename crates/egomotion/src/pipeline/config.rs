@@ -48,7 +48,7 @@ pub enum EstimatorKind {
     Lmeds,
     /// Iteratively reweighted least squares, rows weighted by their own variance.
     Irls,
-    /// Errors in variables: the same weights, without the bias that noisy gradients bring; for `dcce` alone.
+    /// Errors in variables: rows in disparity, all alike, without the bias that noisy gradients bring; for `dcce` alone.
     Eiv,
 }
 

@@ -52,7 +52,7 @@ impl Moving {
         &self.layout
     }
 
-    /// The cell of a pixel.
+    /// [`Cells::index`] for every pixel of an image: a division by a constant is a shift.
     #[inline(always)]
     pub(super) fn index(&self, u: usize, v: usize) -> usize {
         v / CELL_PX * self.layout.columns() + u / CELL_PX

@@ -6,7 +6,6 @@ use rand_pcg::Pcg64Mcg;
 
 use super::{BySigma, Record};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
-use crate::metrics::Nees;
 use crate::pipeline::stereo::{DenseResults, PipelineError};
 use crate::pipeline::{Config, Observe, StereoFrame, StereoMotion};
 use crate::sim::{Scene, SensorNoise, Sequence, View};
@@ -114,16 +113,4 @@ impl<'a> Pair<'a> {
         }
         record.answered = f64::from(answers) / f64::from(pixels.max(1));
     }
-}
-
-/// Σ NEES and count of some records.
-pub(super) fn nees(records: &[&Record]) -> Nees {
-    let mut nees = Nees::default();
-    for record in records {
-        if let Some((error, cov)) = record.phi() {
-            let estimate = crate::geometry::Gaussian { mean: error, cov };
-            nees.add(&estimate, &nalgebra::Vector6::zeros());
-        }
-    }
-    nees
 }

@@ -2,7 +2,9 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::{BySigma, Record, pair, percent};
+use super::{BySigma, Record, percent};
+use crate::geometry::Gaussian;
+use crate::metrics::Nees;
 use crate::study::{Cell, Table};
 
 /// 99 % quantile of χ²₆.
@@ -71,7 +73,10 @@ impl Verdict {
         let n = found.len().max(1) as f64;
         let (mut components, mut directions) = ([0.0; 6], [0.0; 6]);
         let (mut t2, mut r2, mut beyond) = (0.0, 0.0, 0);
+        let mut nees = Nees::default();
         for (error, cov) in &found {
+            let estimate = Gaussian { mean: *error, cov: *cov };
+            nees.add(&estimate, &Vector6::zeros());
             for (i, sum) in components.iter_mut().enumerate() {
                 *sum += error[i].powi(2) / cov[(i, i)] / n;
             }
@@ -80,8 +85,7 @@ impl Verdict {
             }
             t2 += error.fixed_rows::<3>(0).norm_squared() / n;
             r2 += error.fixed_rows::<3>(3).norm_squared() / n;
-            let nees = cov.cholesky().map_or(f64::INFINITY, |c| error.dot(&c.solve(error)));
-            beyond += usize::from(nees > CHI2_6_99);
+            beyond += usize::from(estimate.mahalanobis2(&Vector6::zeros()).is_none_or(|d| d > CHI2_6_99));
         }
         let sum = |of: fn(&Record) -> &BySigma| {
             records.iter().fold(BySigma::default(), |sum, record| sum.merged(of(record)))
@@ -90,7 +94,7 @@ impl Verdict {
             name: name.to_owned(),
             pairs: records.len(),
             answered: found.len(),
-            nees_over_6: pair::nees(records).per_degree(),
+            nees_over_6: nees.per_degree(),
             beyond: (!found.is_empty()).then(|| beyond as f64 / n),
             components,
             directions,
@@ -165,8 +169,43 @@ pub(super) fn pairs(records: &[Record]) -> Table {
         let mut row: Vec<Cell> = vec![record.sequence.as_str().into(), record.pair.into()];
         row.extend(error.iter().map(|&e| Cell::from(e)));
         row.extend((0..6).map(|i| Cell::from(cov[(i, i)].sqrt())));
-        row.push(cov.cholesky().map(|c| error.dot(&c.solve(&error))).into());
+        row.push(Gaussian { mean: error, cov }.mahalanobis2(&Vector6::zeros()).into());
         table.rows.push(row);
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_are_judged_by_component_and_by_eigenvector() {
+        let record = |error: [f64; 6]| {
+            // tY and ΩY are known together: the surest direction lies across them.
+            let mut cov = Matrix6::from_diagonal(&Vector6::new(9.0, 4.0, 16.0, 25.0, 4.0, 36.0));
+            (cov[(1, 4)], cov[(4, 1)]) = (3.0, 3.0);
+            Record {
+                sequence: "C".into(),
+                pair: 0,
+                error: Some(error),
+                cov: cov.iter().copied().collect(),
+                depth_velocity: BySigma::default(),
+                looming: BySigma::default(),
+                answered: 1.0,
+            }
+        };
+        // Across by 4 and along by 0: the eigenvalues are 1 and 7.
+        let across = 8.0_f64.sqrt();
+        let records = [record([3.0, across, 0.0, 0.0, -across, 0.0]), record([3.0, 0.0, 8.0, 0.0, 0.0, 0.0])];
+        let verdict = Verdict::of("C", &records.iter().collect::<Vec<_>>());
+        let near = |found: [f64; 6], expected: [f64; 6]| {
+            found.iter().zip(expected).for_each(|(a, b)| assert!((a - b).abs() < 1e-9, "{found:?}"));
+        };
+        near(verdict.components, [1.0, 1.0, 2.0, 0.0, 1.0, 0.0]);
+        near(verdict.directions, [8.0, 0.0, 1.0, 2.0, 0.0, 0.0]);
+        // 1 + 16 and 1 + 4 over six degrees each; 17 is beyond χ²₆(0.99).
+        assert!((verdict.nees_over_6.unwrap() - 22.0 / 12.0).abs() < 1e-9);
+        assert_eq!(verdict.beyond, Some(0.5));
+    }
 }

@@ -1,0 +1,41 @@
+//! The study that judges the stated uncertainty: what it gives does not depend on threads, and has its columns.
+
+use egomotion::pipeline::Observe;
+use egomotion::study::Study;
+use egomotion::study::consistency::Consistency;
+
+fn small() -> Consistency {
+    Consistency { sequences: vec!["C".into(), "lab-E".into()], pairs: 2, ..Consistency::default() }
+}
+
+#[test]
+fn pairs_are_the_same_on_any_number_of_threads_and_each_its_own() {
+    let study = small();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| study.run(0).unwrap())
+    };
+    let records = with(1);
+    assert!(records == with(3));
+    assert_eq!(records.len(), 2);
+    assert_ne!(records[0].error, records[1].error);
+    for record in &records {
+        assert!(record.error.is_some() && record.answered > 0.9, "{}", record.answered);
+        assert!(record.depth_velocity.all().answers > 60_000 && record.looming.all().answers > 60_000);
+    }
+    let other = Consistency { seed: 2, ..small() };
+    assert_ne!(other.run(0).unwrap()[0].error, records[0].error);
+}
+
+#[test]
+fn every_sequence_has_a_row_and_all_have_one() {
+    let study = Consistency { observe: Observe::Sparse, ..small() };
+    let records: Vec<_> = (0..study.parts().len()).flat_map(|part| study.run(part).unwrap()).collect();
+    let publication = study.publish(&records);
+    let names: Vec<String> = publication.data[0].rows.iter().map(|row| format!("{:?}", row[0])).collect();
+    assert_eq!(names, ["Text(\"C\")", "Text(\"lab-E\")", "Text(\"all\")"]);
+    assert!(publication.data[0].rows.iter().all(|row| row.len() == publication.data[0].columns.len()));
+    assert_eq!(publication.data[1].rows.len(), 4);
+    let unknown = Consistency { sequences: vec!["Q".into()], ..study };
+    assert!(unknown.run(0).is_err());
+}
