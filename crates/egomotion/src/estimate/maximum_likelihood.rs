@@ -280,26 +280,63 @@ pub fn robust_start(
     if pairs.len() < 4 {
         return Err(Unsolvable::FewRows { rows: pairs.len(), needed: 4 });
     }
-    let count = trials(options.confidence, options.outliers, 3);
-    let subsets: Vec<[usize; 3]> = random_subsets::<3>(pairs.len(), count, options.seed).collect();
-    let candidates = subsets.iter().filter_map(|subset| {
-        let alignment = Moments::over(subset.iter().map(|&i| (&pairs[i], 1.0))).align(Form::Rigid)?;
-        Some(alignment.motion()?.log())
-    });
-    let candidates: Vec<Twist> = candidates.chain(prior.copied()).collect();
-    let stride = (sample.len() / FIRST_LOOK).max(1);
-    let glance: Vec<StereoTrack> = sample.iter().step_by(stride).copied().collect();
-    let improve = |candidates: Vec<(f64, Twist)>, sample: &[StereoTrack]| -> Vec<Twist> {
-        candidates.par_iter().map(|(_, phi)| concentrated(phi, sample, rig)).collect()
-    };
-    let finalists = best(&candidates, FINALISTS, &glance, rig);
-    if let Some((_, phi)) = finalists.first().filter(|(_, phi)| middle(phi, &sample, rig) < FITS * MEDIAN) {
-        return Ok(*phi);
+    let search = StartSearch { pairs: &pairs, sample: &sample, rig, options };
+    let mut found = search.round(0, prior)?;
+    for round in 1..ROUNDS {
+        if found.0 < PLAUSIBLE * MEDIAN {
+            break;
+        }
+        let again = search.round(round, None)?;
+        found = if again.0 < found.0 { again } else { found };
     }
-    let finalists = improve(finalists, &glance);
-    let improved = improve(best(&finalists, IMPROVED, &sample, rig), &sample);
-    best(&improved, 1, &sample, rig).first().map(|&(_, phi)| phi).ok_or(Unsolvable::Unobservable)
+    Ok(found.1)
 }
+
+/// The search for the motion with the least median of q.
+struct StartSearch<'a> {
+    pairs: &'a [PointPair],
+    sample: &'a [StereoTrack],
+    rig: &'a StereoRig,
+    options: &'a MaximumLikelihoodOptions,
+}
+
+impl StartSearch<'_> {
+    /// The best of fresh subsets and the prior, with its median of q.
+    fn round(&self, round: u64, prior: Option<&Twist>) -> Result<(f64, Twist), Unsolvable> {
+        let (sample, rig) = (self.sample, self.rig);
+        let candidates = self.candidates(round, prior);
+        let stride = (sample.len() / FIRST_LOOK).max(1);
+        let glance: Vec<StereoTrack> = sample.iter().step_by(stride).copied().collect();
+        let improve = |candidates: Vec<(f64, Twist)>, sample: &[StereoTrack]| -> Vec<Twist> {
+            candidates.par_iter().map(|(_, phi)| concentrated(phi, sample, rig)).collect()
+        };
+        let finalists = best(&candidates, FINALISTS, &glance, rig);
+        let first = finalists.first().map(|(_, phi)| (middle(phi, sample, rig), *phi));
+        if let Some(fits) = first.filter(|(middle, _)| *middle < FITS * MEDIAN) {
+            return Ok(fits);
+        }
+        let finalists = improve(finalists, &glance);
+        let improved = improve(best(&finalists, IMPROVED, sample, rig), sample);
+        best(&improved, 1, sample, rig).first().copied().ok_or(Unsolvable::Unobservable)
+    }
+
+    /// Alignments of three points each.
+    fn candidates(&self, round: u64, prior: Option<&Twist>) -> Vec<Twist> {
+        let count = trials(self.options.confidence, self.options.outliers, 3);
+        let subsets = random_subsets::<3>(self.pairs.len(), count, self.options.seed.wrapping_add(round));
+        let alignment = |subset: [usize; 3]| {
+            let moments = Moments::over(subset.iter().map(|&i| (&self.pairs[i], 1.0)));
+            Some(moments.align(Form::Rigid)?.motion()?.log())
+        };
+        subsets.filter_map(alignment).chain(prior.copied()).collect()
+    }
+}
+
+/// Subsets are drawn anew, so many times at most,
+const ROUNDS: u64 = 4;
+/// while the least median of q is above so many times that of noise: half of all tracks are then outliers, or the
+/// search has failed, as three noisy points do now and then beside a large moving body.
+const PLAUSIBLE: f64 = 4.0;
 
 /// Candidates are first judged on about so many observations,
 const FIRST_LOOK: usize = 100;
