@@ -2,6 +2,7 @@
 
 mod args;
 mod chart;
+mod config;
 mod demo;
 mod evaluate;
 mod feed;
@@ -13,6 +14,7 @@ mod report;
 mod results;
 mod run;
 mod session;
+mod shell;
 mod simulate;
 mod study;
 mod summary;
@@ -55,6 +57,9 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => evaluate::evaluate(args),
         Command::Info(args) => info::info(args),
         Command::Study { command } => study::study(command),
+        Command::Config => config::config(),
+        Command::Completions(args) => shell::completions(args),
+        Command::Man(args) => shell::man(args),
     };
     match ending {
         Ok(Ending::Done) => ExitCode::SUCCESS,

@@ -1,6 +1,5 @@
 //! The files of a run; each appears whole or not at all.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -8,7 +7,8 @@ use egomotion::geometry::StereoRig;
 use egomotion::motion::TimeToImpact;
 use egomotion::pipeline::stereo::DenseResults;
 use egomotion::pipeline::{Config, Observe};
-use egomotion_io::trajectory::{Pose, write_kitti, write_tum};
+use egomotion_io::motion_table::{self, Motion, MotionRow};
+use egomotion_io::trajectory::{Pose, write_euroc, write_kitti, write_tum};
 use egomotion_io::{flo, pfm, write};
 use serde::Serialize;
 
@@ -87,7 +87,7 @@ impl ResultFolder {
         Ok(())
     }
 
-    /// Write the trajectory in both formats, `motion.csv`, and where every pixel was seen `moving.csv`.
+    /// Write the trajectory in all formats, `motion.csv`, and where every pixel was seen `moving.csv`.
     pub fn write_motion(&self, config: &Config, outcome: &Outcome) -> Result<()> {
         let times = outcome.trajectory.times_s();
         let poses: Vec<Pose> = outcome
@@ -99,10 +99,13 @@ impl ResultFolder {
             .collect();
         write_tum(&self.path.join("trajectory_tum.txt"), &poses)?;
         write_kitti(&self.path.join("trajectory_kitti.txt"), &poses)?;
+        write_euroc(&self.path.join("trajectory_euroc.csv"), &poses)?;
         if config.observe == Observe::Dense {
             self.write("moving.csv", moving::table(&outcome.rows)?.as_bytes())?;
         }
-        self.write("motion.csv", motion_table(&outcome.rows)?.as_bytes())
+        // The first frame has no motion.
+        let rows: Vec<MotionRow> = outcome.rows.iter().skip(1).map(motion_row).collect();
+        Ok(motion_table::write(&self.path.join("motion.csv"), &rows)?)
     }
 }
 
@@ -152,53 +155,26 @@ impl ResultFolder {
     }
 }
 
-/// `motion.csv`: one row for each frame from the second on.
-fn motion_table(rows: &[Row]) -> Result<String> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    let mut head: Vec<String> =
-        ["frame", "time_s", "dt_s", "tx", "ty", "tz", "wx", "wy", "wz"].map(String::from).to_vec();
-    head.extend(upper_triangle().map(|(i, j)| format!("cov_{i}{j}")));
-    head.extend(
-        ["rows", "inliers", "observed", "impact_s", "impact_lo_s", "impact_hi_s", "status"].map(String::from),
-    );
-    table.write_record(&head)?;
-    for row in rows.iter().skip(1) {
-        table.write_record(motion_record(row))?;
-    }
-    let bytes = table.into_inner().map_err(|e| e.into_error())?;
-    Ok(String::from_utf8(bytes)?)
-}
-
-fn upper_triangle() -> impl Iterator<Item = (usize, usize)> {
-    (0..6).flat_map(|i| (i..6).map(move |j| (i, j)))
-}
-
-fn motion_record(row: &Row) -> Vec<String> {
+/// A row of `motion.csv`.
+fn motion_row(row: &Row) -> MotionRow {
     let motion = &row.motion;
-    let number = |v: f64| format!("{v:?}");
-    let mut record = vec![row.index.to_string(), number(motion.time_s)];
-    record.push(motion.dt_s.map_or(String::new(), number));
-    match &motion.motion {
-        Ok(estimate) => {
-            let shown = |i: usize, v: f64| if estimate.observed[i] { number(v) } else { String::new() };
-            record.extend((0..6).map(|i| shown(i, estimate.theta.mean[i])));
-            record.extend(upper_triangle().map(|(i, j)| number(estimate.theta.cov[(i, j)])));
-            record.extend([estimate.rows.to_string(), estimate.inliers.to_string()]);
-            let mut observed = String::new();
-            for o in estimate.observed {
-                let _ = write!(observed, "{}", u8::from(o));
-            }
-            record.push(observed);
-        }
-        Err(_) => record.extend(std::iter::repeat_n(String::new(), 6 + 21 + 3)),
+    let impact = motion.impact();
+    MotionRow {
+        frame: row.index,
+        time_s: motion.time_s,
+        dt_s: motion.dt_s,
+        motion: motion.motion.as_ref().ok().map(|estimate| Motion {
+            phi: estimate.theta,
+            observed: estimate.observed,
+            rows: estimate.rows,
+            inliers: estimate.inliers,
+        }),
+        impact_s: impact.and_then(|impact| {
+            let (low, high) = impact.interval95_s()?;
+            Some([impact.seconds()?, low, high])
+        }),
+        status: status(row).to_owned(),
     }
-    let interval = motion.impact().and_then(|impact| Some((impact.seconds()?, impact.interval95_s()?)));
-    match interval {
-        Some((seconds, (lo, hi))) => record.extend([seconds, lo, hi].map(number)),
-        None => record.extend(std::iter::repeat_n(String::new(), 3)),
-    }
-    record.push(status(row).to_owned());
-    record
 }
 
 /// `ok`, `partial`, or why there is no answer.

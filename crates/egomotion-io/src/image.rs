@@ -1,7 +1,9 @@
-//! Grey images from PNG files, and grey and colour PNG files for people to look at.
+//! Grey images from PNG, JPEG, TIFF and PNM files, and grey and colour PNG files for people to look at.
 
+use std::io::{BufReader, Cursor};
 use std::path::Path;
 
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use egomotion::geometry::{Grid, Image};
 use png::{BitDepth, ColorType};
 
@@ -11,37 +13,104 @@ use crate::{IoError, read};
 /// Rec. 601 luma of red, green and blue.
 const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
-/// A grey image from a PNG file; see [`decode`].
+/// Endings of the names of images that can be read, in small letters.
+pub const ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "tif", "tiff", "pgm", "ppm", "pnm"];
+
+/// What is read beside PNG.
+const KINDS: [ImageFormat; 3] = [ImageFormat::Jpeg, ImageFormat::Tiff, ImageFormat::Pnm];
+/// The first bytes of every PNG.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// Whether a file's name ends like that of an image.
+pub fn is_named_like_one(path: &Path) -> bool {
+    let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
+    ending.is_some_and(|ending| ENDINGS.contains(&&*ending))
+}
+
+/// A grey image from a file; see [`decode`].
 ///
 /// # Errors
-/// The file cannot be read, is not a PNG, is cut or corrupt, or has more than [`read::MAX_PIXELS`].
+/// The file cannot be read, is no image of a known kind, is cut or corrupt, or has more than [`read::MAX_PIXELS`].
 pub fn read(path: &Path) -> Result<Image, IoError> {
     decode(&read::bytes(path)?, path)
 }
 
-/// (width, height) of a PNG file in pixels, from its head alone.
+/// (width, height) of an image file in pixels, from its head alone.
 ///
 /// # Errors
-/// The file cannot be read, or does not start as a PNG.
+/// The file cannot be read, or does not start as an image of a known kind.
 pub fn size(path: &Path) -> Result<(usize, usize), IoError> {
-    raster::size(path)
+    if let Ok(size) = raster::size(path) {
+        return Ok(size);
+    }
+    let file = std::fs::File::open(path).map_err(|error| IoError::system(path, "read", &error))?;
+    let reader = ImageReader::new(BufReader::new(file)).with_guessed_format();
+    let reader = reader.map_err(|error| IoError::system(path, "read", &error))?;
+    if !reader.format().is_some_and(|format| KINDS.contains(&format)) {
+        return raster::size(path);
+    }
+    let (width, height) = reader.into_dimensions().map_err(|error| broken(path, &error))?;
+    let size = (width as usize, height as usize);
+    read::pixels(path, size.0, size.1).map(|_| size)
 }
 
-/// A grey image from the content of a PNG; `path` names it in errors.
+/// A grey image from the content of a PNG, JPEG, TIFF, PGM or PPM file; `path` names it in errors.
 ///
 /// Grey levels are 0 … 255, or 0 … 65535 of a 16-bit file; colour becomes Rec. 601 luma; alpha is
 /// ignored.
 ///
 /// # Errors
-/// The content is not a PNG, is cut or corrupt, or has more than [`read::MAX_PIXELS`].
+/// The content is no image of a known kind, is cut or corrupt, or has more than [`read::MAX_PIXELS`].
 pub fn decode(content: &[u8], path: &Path) -> Result<Image, IoError> {
+    if !content.starts_with(PNG) {
+        return other(content, path);
+    }
     let raster = Raster::decode(content, path)?;
     let levels = match raster.depth {
         BitDepth::Sixteen => grey(&raster, |bytes: [u8; 2]| f32::from(u16::from_be_bytes(bytes))),
         _ => grey(&raster, |[byte]: [u8; 1]| f32::from(byte)),
     };
-    Grid::from_values(raster.width, raster.height, levels)
+    grid(path, (raster.width, raster.height), levels)
+}
+
+fn grid(path: &Path, (width, height): (usize, usize), levels: Vec<f32>) -> Result<Image, IoError> {
+    Grid::from_values(width, height, levels)
         .ok_or_else(|| IoError::new(path, "has not as many samples as pixels", "replace the file"))
+}
+
+/// What is no PNG.
+fn other(content: &[u8], path: &Path) -> Result<Image, IoError> {
+    let reader = ImageReader::new(Cursor::new(content)).with_guessed_format();
+    let mut reader = reader.map_err(|error| IoError::system(path, "read", &error))?;
+    if !reader.format().is_some_and(|format| KINDS.contains(&format)) {
+        let reason = "is no PNG, JPEG, TIFF, PGM or PPM image";
+        return Err(IoError::new(path, reason, "give images of one of these kinds"));
+    }
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(4 * read::MAX_PIXELS as u64);
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(|error| broken(path, &error))?;
+    let (width, height) = decoder.dimensions();
+    let size = (width as usize, height as usize);
+    read::pixels(path, size.0, size.1)?;
+    let image = DynamicImage::from_decoder(decoder).map_err(|error| broken(path, &error))?;
+    fn luma<T: Copy + Into<f32>>(samples: &[T]) -> Vec<f32> {
+        let (pixels, _) = samples.as_chunks::<3>();
+        pixels.iter().map(|&[r, g, b]| LUMA[0] * r.into() + LUMA[1] * g.into() + LUMA[2] * b.into()).collect()
+    }
+    let levels = match image {
+        DynamicImage::ImageLuma8(grey) => grey.iter().map(|&level| f32::from(level)).collect(),
+        DynamicImage::ImageLuma16(grey) => grey.iter().map(|&level| f32::from(level)).collect(),
+        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) | DynamicImage::ImageLumaA16(_) => {
+            luma(&image.into_rgb16())
+        }
+        _ => luma(&image.into_rgb8()),
+    };
+    grid(path, size, levels)
+}
+
+fn broken(path: &Path, reason: &dyn std::fmt::Display) -> IoError {
+    IoError::new(path, format_args!("is not a whole image: {reason}"), "replace the file")
 }
 
 /// The grey level of each pixel, from samples of N bytes.
@@ -114,6 +183,48 @@ mod tests {
         assert_eq!(levels(Rgba, Eight, &[0, 0, 0, 0, 100, 200, 50, 3]), [0.0, luma]);
         let wide = levels(Rgba, Sixteen, &[0, 0, 0, 0, 0, 0, 0, 0, 100, 0, 200, 0, 50, 0, 9, 9]);
         assert!((wide[1] - 256.0 * luma).abs() < 0.01);
+    }
+
+    #[test]
+    fn other_kinds_become_grey() {
+        use ::image::{Luma, Rgb};
+        let encoded = |image: DynamicImage, format| {
+            let mut content = Cursor::new(Vec::new());
+            image.write_to(&mut content, format).unwrap();
+            content.into_inner()
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let grey = ::image::GrayImage::from_fn(17, 9, |u, v| Luma([(10 * u + v) as u8]));
+        let wide = ::image::ImageBuffer::from_fn(17, 9, |u, v| Luma([(1000 * u + v) as u16]));
+        let colour = ::image::RgbImage::from_pixel(17, 9, Rgb([100, 200, 50]));
+        let luma = 0.299 * 100.0 + 0.587 * 200.0 + 0.114 * 50.0;
+        for (format, name) in
+            [(ImageFormat::Tiff, "a.tif"), (ImageFormat::Pnm, "a.pgm"), (ImageFormat::Jpeg, "a.jpg")]
+        {
+            let path = folder.path().join(name);
+            assert!(is_named_like_one(&path));
+            let content = encoded(grey.clone().into(), format);
+            std::fs::write(&path, &content).unwrap();
+            assert_eq!(size(&path).unwrap(), (17, 9));
+            let image = read(&path).unwrap();
+            // JPEG loses some.
+            assert!((image.at(16, 8) - 168.0).abs() < 4.0 && (image.at(3, 0) - 30.0).abs() < 4.0, "{name}");
+            if format != ImageFormat::Jpeg {
+                assert_eq!(image.at(16, 8), 168.0);
+                assert_eq!(decode(&encoded(wide.clone().into(), format), &path).unwrap().at(16, 8), 16008.0);
+            }
+            let image = decode(&encoded(colour.clone().into(), format), &path).unwrap();
+            assert!((image.at(5, 5) - luma).abs() < 2.0, "{name}: {}", image.at(5, 5));
+            for length in 0..content.len() - 2 {
+                // Cut anywhere it is an error or, where only the filling of a JPEG's end is lost, an image.
+                let cut = decode(&content[..length], &path);
+                assert!(cut.is_err() || format == ImageFormat::Jpeg, "{name} {length}");
+            }
+        }
+        let error = decode(b"GIF89a, or whatever", Path::new("a.gif")).unwrap_err().to_string();
+        assert!(error.contains("a.gif: is no PNG, JPEG, TIFF, PGM or PPM image"), "{error}");
+        let error = decode(b"P5 100000 100000 255 ", Path::new("a.pgm")).unwrap_err().to_string();
+        assert!(error.contains("a.pgm: has a size of 100000x100000"), "{error}");
     }
 
     #[test]

@@ -22,6 +22,7 @@ pub mod error;
 pub mod flo;
 pub mod flow_png;
 pub mod image;
+pub mod motion_table;
 pub mod pfm;
 mod raster;
 pub mod read;

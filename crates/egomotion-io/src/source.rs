@@ -1,6 +1,7 @@
 //! What a SOURCE folder holds: its layout, frames, time stamps, rig and truth.
 
 mod kitti_odometry;
+mod kitti_raw;
 mod kitti_scenes;
 mod listing;
 
@@ -31,6 +32,8 @@ pub struct Source {
 pub enum Layout {
     /// `image_0`, `image_1` (or `image_2`, `image_3`), `calib.txt`, perhaps `times.txt` and poses.
     KittiOdometry,
+    /// A raw drive, synchronised and rectified: `image_00/data`, `image_01/data` (or 02, 03), perhaps `oxts`.
+    KittiRaw,
     /// The stereo and flow set of 2012: grey scenes `image_0`, `image_1`, `calib/`.
     KittiStereoFlow2012,
     /// The scene flow set of 2015: colour scenes `image_2`, `image_3`, `calib_cam/`.
@@ -130,6 +133,10 @@ impl Source {
             Some(found) => Some(found),
             None => kitti_odometry::recognise(&folder, calibration)?,
         };
+        let recognised = match recognised {
+            Some(found) => Some(found),
+            None => kitti_raw::recognise(&folder, calibration)?,
+        };
         let (layout, reason, sequences) = recognised.ok_or_else(|| unknown(path, &folder))?;
         Ok(Self { path: path.to_owned(), layout, reason, sequences })
     }
@@ -155,6 +162,7 @@ impl fmt::Display for Layout {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::KittiOdometry => "KITTI odometry",
+            Self::KittiRaw => "KITTI raw",
             Self::KittiStereoFlow2012 => "KITTI stereo and flow 2012",
             Self::KittiSceneFlow2015 => "KITTI scene flow 2015",
         })

@@ -1,4 +1,5 @@
-//! Trajectories: TUM rows (`timestamp tx ty tz qx qy qz qw`) and KITTI rows (12 numbers, a 3×4 matrix).
+//! Trajectories: TUM rows (`timestamp tx ty tz qx qy qz qw`), KITTI rows (12 numbers, a 3×4 matrix) and EuRoC's CSV
+//! (`nanoseconds, tx, ty, tz, qw, qx, qy, qz`, more columns allowed).
 
 use std::path::Path;
 
@@ -16,13 +17,15 @@ pub struct Pose {
     pub world_from_camera: RigidMotion,
 }
 
-/// Which of the two row formats.
+/// Which of the row formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// `timestamp tx ty tz qx qy qz qw`: 8 numbers a row.
     Tum,
     /// The upper 3×4 of the pose matrix, row by row: 12 numbers a row.
     Kitti,
+    /// `nanoseconds, tx, ty, tz, qw, qx, qy, qz, …`: at least 8 numbers between commas.
+    Euroc,
 }
 
 /// How far R Rᵀ may be from the identity in a file: files round to few digits.
@@ -47,9 +50,13 @@ pub fn parse(text: &str, format: Option<Format>, path: &Path) -> Result<Vec<Pose
     let (shape, advice) = match format {
         Some(Format::Tum) => ("8", "give `timestamp tx ty tz qx qy qz qw`"),
         Some(Format::Kitti) => ("12", "give the 12 numbers of a 3x4 matrix"),
-        None => ("8 or 12", "give TUM rows (8 numbers) or KITTI rows (12 numbers)"),
+        Some(Format::Euroc) => ("8 or more", "give `nanoseconds, tx, ty, tz, qw, qx, qy, qz`"),
+        None => ("8 or 12", "give TUM rows (8 numbers), KITTI rows (12 numbers) or EuRoC's CSV"),
     };
     let pose = |line: &str| -> Result<Pose, String> {
+        if format == Some(Format::Euroc) || (format.is_none() && line.contains(',')) {
+            return euroc_pose(line);
+        }
         let row = read::numbers(line)?;
         match (format, row.len()) {
             (None | Some(Format::Tum), 8) => tum_pose(&row),
@@ -86,6 +93,30 @@ fn tum_pose(m: &[f64]) -> Result<Pose, String> {
     Ok(Pose { time_s: Some(m[0]), world_from_camera })
 }
 
+/// A pose from `nanoseconds, tx, ty, tz, qw, qx, qy, qz, …`.
+fn euroc_pose(line: &str) -> Result<Pose, String> {
+    let mut fields = line.split(',').map(str::trim);
+    let stamp = fields.next().unwrap_or_default();
+    // Nanoseconds since 1970 have more digits than a float: whole seconds are split off first.
+    let nanoseconds: i128 =
+        stamp.parse().map_err(|_| format!("\"{stamp}\" is not a time stamp in whole nanoseconds"))?;
+    let row: Vec<f64> = fields.take(7).map(read::number).collect::<Result<_, _>>()?;
+    if row.len() != 7 {
+        return Err(format!("the row has {} numbers, not 8 or more", row.len() + 1));
+    }
+    let pose = tum_pose(&[0.0, row[0], row[1], row[2], row[4], row[5], row[6], row[3]])?;
+    let billion = 1_000_000_000;
+    let time_s = (nanoseconds / billion) as f64 + (nanoseconds % billion) as f64 * 1e-9;
+    Ok(Pose { time_s: Some(time_s), ..pose })
+}
+
+/// One row of EuRoC's CSV, without the end of line.
+pub fn euroc_row(time_s: f64, world_from_camera: &RigidMotion) -> String {
+    let (t, q) = (&world_from_camera.translation, world_from_camera.quaternion());
+    let nanoseconds = (time_s.fract() * 1e9).round() as i128 + time_s.trunc() as i128 * 1_000_000_000;
+    format!("{nanoseconds},{:?},{:?},{:?},{:?},{:?},{:?},{:?}", t.x, t.y, t.z, q.w, q.i, q.j, q.k)
+}
+
 /// One TUM row, without the end of line; numbers are written so that they read back the same.
 pub fn tum_row(time_s: f64, world_from_camera: &RigidMotion) -> String {
     let (t, q) = (&world_from_camera.translation, world_from_camera.quaternion());
@@ -104,14 +135,34 @@ pub fn kitti_row(world_from_camera: &RigidMotion) -> String {
 /// # Errors
 /// The file cannot be written, or a pose has no time stamp.
 pub fn write_tum(path: &Path, poses: &[Pose]) -> Result<(), IoError> {
-    let row = |(i, pose): (usize, &Pose)| match pose.time_s {
-        Some(time_s) => Ok(tum_row(time_s, &pose.world_from_camera) + "\n"),
-        None => {
-            Err(IoError::new(path, format_args!("pose {i} has no time stamp"), "write KITTI rows instead"))
-        }
-    };
-    let text: String = poses.iter().enumerate().map(row).collect::<Result<_, _>>()?;
+    write_timed(path, "", poses, tum_row)
+}
+
+fn write_timed(
+    path: &Path,
+    head: &str,
+    poses: &[Pose],
+    row: fn(f64, &RigidMotion) -> String,
+) -> Result<(), IoError> {
+    let mut text = head.to_owned();
+    for (i, pose) in poses.iter().enumerate() {
+        let Some(time_s) = pose.time_s else {
+            let reason = format_args!("pose {i} has no time stamp").to_string();
+            return Err(IoError::new(path, reason, "write KITTI rows instead"));
+        };
+        text += &row(time_s, &pose.world_from_camera);
+        text.push('\n');
+    }
     write::bytes(path, text.as_bytes())
+}
+
+/// Write a trajectory in EuRoC's format.
+///
+/// # Errors
+/// The file cannot be written, or a pose has no time stamp.
+pub fn write_euroc(path: &Path, poses: &[Pose]) -> Result<(), IoError> {
+    let head = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w [],q_x [],q_y [],q_z []\n";
+    write_timed(path, head, poses, euroc_row)
 }
 
 /// Write a trajectory in KITTI's format.
@@ -150,6 +201,30 @@ mod tests {
             assert!((tum.world_from_camera.rotation - given.world_from_camera.rotation).amax() < 1e-14);
         }
         assert!(write_tum(&tum, &read(&kitti, None).unwrap()).is_err());
+    }
+
+    #[test]
+    fn euroc_rows_come_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("data.csv");
+        write_euroc(&path, &poses()).unwrap();
+        for (given, found) in poses().iter().zip(read(&path, None).unwrap()) {
+            // A float holds seconds since 1970 to a quarter of a microsecond.
+            assert!((found.time_s.unwrap() - given.time_s.unwrap()).abs() < 5e-7);
+            assert_eq!(found.world_from_camera.translation, given.world_from_camera.translation);
+            assert!((found.world_from_camera.rotation - given.world_from_camera.rotation).amax() < 1e-14);
+        }
+        // As the set has it: w comes first, and velocities and biases follow.
+        let row = "1403636580838555648,4.6,-1.7,0.8,0.5,-0.5,0.5,-0.5,0,0,0,0,0,0,0,0,0";
+        let pose = parse(row, None, Path::new("data.csv")).unwrap()[0];
+        assert_eq!(pose.time_s, Some(1_403_636_580.838_555_6));
+        assert!((pose.world_from_camera.rotation * Vector3::x() + Vector3::y()).norm() < 1e-12);
+        let refused = |text: &str| parse(text, None, Path::new("d.csv")).unwrap_err().to_string();
+        assert!(
+            refused("1.5,0,0,0,1,0,0,0")
+                .contains("d.csv:1: \"1.5\" is not a time stamp in whole nanoseconds")
+        );
+        assert!(refused("15,0,0,0,1,0,0").contains("d.csv:1: the row has 7 numbers, not 8 or more"));
     }
 
     #[test]

@@ -197,3 +197,60 @@ fn a_broken_first_image_does_not_stop_the_opening() {
     }
     assert!(refused(folder.path()).contains("000000.png: is not a whole PNG image"));
 }
+
+/// A raw drive of three pairs: east by one hundred-thousandth of a degree a frame, turning left about the vertical.
+fn raw_drive() -> TempDir {
+    let day = tempfile::tempdir().unwrap();
+    let drive = day.path().join("drive_0001_sync");
+    for k in 0..3 {
+        picture(&drive, &format!("image_00/data/{k:010}.png"));
+        picture(&drive, &format!("image_01/data/{k:010}.png"));
+        let oxts = drive.join("oxts/data");
+        fs::create_dir_all(&oxts).unwrap();
+        let (longitude, yaw) = (8.4 + 1e-5 * f64::from(k), 0.01 * f64::from(k));
+        fs::write(oxts.join(format!("{k:010}.txt")), format!("0 {longitude} 110.5 0 0 {yaw} 0 0 0\n"))
+            .unwrap();
+    }
+    let stamps = "2011-09-26 13:02:25.951199337\n2011-09-26 13:02:26.054847\n2011-09-26 13:02:26.15\n";
+    fs::write(drive.join("image_00/timestamps.txt"), stamps).unwrap();
+    let rectified = CALIBRATION.replace('P', "P_rect_0") + "R_rect_00: 1 0 0 0 1 0 0 0 1\n";
+    fs::write(day.path().join("calib_cam_to_cam.txt"), rectified).unwrap();
+    // The laser's axes are those of the inertial system, one metre ahead of it; the camera looks ahead.
+    let calibration = |name: &str, text: &str| fs::write(day.path().join(name), text).unwrap();
+    calibration("calib_imu_to_velo.txt", "R: 1 0 0 0 1 0 0 0 1\nT: -1 0 0\n");
+    calibration("calib_velo_to_cam.txt", "R: 0 -1 0 0 0 -1 1 0 0\nT: 0 0 0\n");
+    day
+}
+
+#[test]
+fn a_raw_drive_has_time_stamps_and_the_poses_of_its_inertial_system() {
+    let day = raw_drive();
+    let source = Source::open(&day.path().join("drive_0001_sync")).unwrap();
+    assert_eq!(source.layout, Layout::KittiRaw);
+    let sequence = &source.sequences[0];
+    assert_eq!((sequence.name.as_str(), sequence.clock), ("drive_0001_sync", Clock::Measured));
+    assert_eq!(sequence.rig.unwrap().baseline_m, 0.5);
+    let times: Vec<f64> = sequence.frames.iter().map(|f| f.time_s).collect();
+    assert_eq!(times[0], 0.0);
+    assert!((times[1] - 0.103647663).abs() < 1e-4 && (times[2] - 0.198800663).abs() < 1e-4, "{times:?}");
+    let pose = |k: usize| sequence.frames[k].truth.unwrap();
+    let step = pose(0).inverse().after(&pose(1));
+    // East is ahead: depth grows by the step, and by nothing that the turn about the inertial system adds to it.
+    let metre = 6_378_137.0 * 1e-5_f64.to_radians();
+    let (sin, cos) = 0.01_f64.sin_cos();
+    let expected = Vector3::new(-sin, 0.0, metre + cos - 1.0);
+    assert!((step.translation - expected).norm() < 1e-6, "{} {expected}", step.translation);
+    assert!((step.rotation[(2, 0)] - sin).abs() < 1e-9, "{}", step.rotation);
+    // Without the way to the inertial system there is no truth; without stamps no drive.
+    fs::remove_file(day.path().join("calib_imu_to_velo.txt")).unwrap();
+    let drive = day.path().join("drive_0001_sync");
+    assert!(Source::open(&drive).unwrap().sequences[0].frames[0].truth.is_none());
+    fs::write(drive.join("image_00/timestamps.txt"), "2011-09-26 13:02:25.9\nnoon\n").unwrap();
+    assert!(
+        refused(&drive).contains("timestamps.txt:2: \"noon\" is not a time stamp"),
+        "{}",
+        refused(&drive)
+    );
+    fs::write(drive.join("image_00/timestamps.txt"), "2011-09-26 13:02:25.9\n").unwrap();
+    assert!(refused(&drive).contains("image 1 has none"), "{}", refused(&drive));
+}

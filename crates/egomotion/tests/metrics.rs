@@ -4,7 +4,8 @@
 use approx::assert_relative_eq;
 use egomotion::geometry::{Gaussian, RigidMotion};
 use egomotion::metrics::{
-    Coverage, KITTI_LENGTHS_M, Nees, SectionSeven, kitti_drift, quantile, relative_pose_error, travelled_m,
+    Alignment, Coverage, Delta, KITTI_LENGTHS_M, Nees, SectionSeven, align, associate, kitti_drift, pairs,
+    quantile, relative_pose_error, travelled_m,
 };
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 use rand::SeedableRng;
@@ -138,4 +139,52 @@ fn quantiles_interpolate() {
     assert_eq!(quantile(&[4.0, 1.0], 1.0), Some(4.0));
     assert_relative_eq!(quantile(&[0.0, 10.0], 0.99).unwrap(), 9.9, max_relative = 1e-12);
     assert_eq!(quantile(&[], 0.5), None);
+}
+
+#[test]
+fn stamps_are_associated_with_the_nearest() {
+    let truth = [0.0, 0.1, 0.2, 0.3, 0.4];
+    assert_eq!(associate(&[0.104, 0.38, 0.9], &truth, 0.025), [(0, 1), (1, 4)]);
+    // Of two at the same distance the earlier one; the shorter list asks, whichever it is.
+    assert_eq!(associate(&[0.25], &[0.0, 0.125, 0.375], 1.0), [(0, 1)]);
+    assert_eq!(associate(&truth, &[0.11, 0.19], 0.05), [(1, 0), (2, 1)]);
+    assert!(associate(&[], &truth, 1.0).is_empty() && associate(&truth, &[], 1.0).is_empty());
+}
+
+#[test]
+fn pairs_follow_each_other() {
+    let truth = truth();
+    let times: Vec<f64> = (0..truth.len()).map(|k| 0.1 * k as f64).collect();
+    assert_eq!(pairs(Delta::Frames(12), &truth, &[]), [(0, 12), (12, 24)]);
+    assert_eq!(pairs(Delta::Seconds(1.0), &truth, &times), [(0, 10), (10, 20), (20, 30)]);
+    let travelled = travelled_m(&truth);
+    for (i, j) in pairs(Delta::Metres(5.0), &truth, &[]) {
+        assert!(travelled[j] - travelled[i] >= 5.0 && travelled[j - 1] - travelled[i] < 5.0);
+    }
+    assert!(
+        pairs(Delta::Metres(0.0), &truth, &[]).is_empty() && pairs(Delta::Frames(1), &[], &[]).is_empty()
+    );
+}
+
+#[test]
+fn a_moved_and_scaled_trajectory_is_laid_back() {
+    let (truth, world) = (truth(), pose(0.7, -1.2, [3.0, -2.0, 11.0]));
+    let moved: Vec<RigidMotion> = truth
+        .iter()
+        .map(|p| {
+            let moved = world.after(p);
+            RigidMotion { translation: moved.translation * 0.25, ..moved }
+        })
+        .collect();
+    let found = align(&moved, &truth, Alignment::Sim3).unwrap();
+    assert_relative_eq!(found.scale, 4.0, max_relative = 1e-9);
+    for (moved, truth) in moved.iter().zip(&truth) {
+        let back = found.apply(moved);
+        assert!((back.translation - truth.translation).norm() < 1e-9);
+        assert!((back.rotation - truth.rotation).amax() < 1e-9);
+    }
+    assert_eq!(align(&moved, &truth, Alignment::Se3).unwrap().scale, 1.0);
+    // A line leaves the turn about it open.
+    let line: Vec<RigidMotion> = (0..5).map(|k| pose(0.0, 0.0, [0.0, 0.0, f64::from(k)])).collect();
+    assert_eq!(align(&line, &line, Alignment::Se3), None);
 }

@@ -7,6 +7,8 @@
 
 use std::fs;
 
+use serde_json::Value;
+
 use tempfile::TempDir;
 
 use crate::process::{Ended, assert_refused, egomotion};
@@ -157,4 +159,62 @@ fn files_that_are_no_trajectories() {
     refused(row, &[], &["bad.txt: 1 pose in common", "two are needed"]);
     let missing = egomotion(["evaluate", "missing.txt", &truth]);
     assert_refused(&missing, 1, &["missing.txt: cannot read", "check the path"]);
+}
+
+/// `data/evo`: trajectories of 60 and 57 poses with clocks of their own, in worlds of their own, at another scale, and
+/// what evo 1.38 says of them; all made by `bench/evaluate.py`.
+#[test]
+fn figures_are_those_of_evo() {
+    let text = fs::read_to_string(data("evo/expected.json")).unwrap();
+    let expected: Value = serde_json::from_str(&text).unwrap();
+    let (estimate, truth) = (data("evo/estimate.txt"), data("evo/truth.txt"));
+    for name in ["none", "se3", "sim3"] {
+        let report = evaluate(&estimate, &truth, &format!("--align {name} --delta 1f,3f,5m")).json();
+        assert_eq!(report["frames"], expected["poses"]);
+        assert_eq!(report["alignment"], name);
+        let same = |found: &Value, expected: &Value, what: &str| {
+            for (key, value) in expected.as_object().unwrap() {
+                let (found, value) = (found[key].as_f64().unwrap(), value.as_f64().unwrap());
+                // Sums of squares of metres are large.
+                assert!(
+                    (found - value).abs() <= 1e-6 * value.abs().max(1.0),
+                    "{name} {what} {key}: {found}, not {value}"
+                );
+            }
+        };
+        same(&report["absolute_m"], &expected[name]["absolute_m"], "absolute");
+        for (over, delta) in report["relative"].as_array().unwrap().iter().zip(["1f", "3f", "5m"]) {
+            assert_eq!(over["delta"], delta);
+            for part in ["translation_m", "rotation_deg"] {
+                same(&over[part], &expected[name][delta][part], &format!("{delta} {part}"));
+            }
+        }
+    }
+}
+
+#[test]
+fn clocks_that_never_meet_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("late.txt");
+    let late: String = fs::read_to_string(data("evo/estimate.txt"))
+        .unwrap()
+        .lines()
+        .map(|line| format!("9{line}\n"))
+        .collect();
+    fs::write(&path, late).unwrap();
+    let files = ["evaluate".to_owned(), path.display().to_string(), data("evo/truth.txt")];
+    let ended = egomotion(files.clone());
+    assert_refused(&ended, 1, &["late.txt: 0 pose lies within 0.01 s of one of", "--associate row"]);
+    let ended = egomotion(files.into_iter().chain(["--associate".to_owned(), "row".to_owned()]));
+    assert_eq!(ended.code, 0, "{}", ended.stderr);
+    assert!(ended.stdout.starts_with("57 poses, associated by row\n"), "{}", ended.stdout);
+}
+
+#[test]
+fn distances_and_alignments_that_mean_nothing_are_wrong_usage() {
+    let (estimate, truth) = (data("evo/estimate.txt"), data("evo/truth.txt"));
+    for option in ["--delta=1x", "--delta=0m", "--delta=-1s", "--delta=0f", "--align=affine"] {
+        let files = ["evaluate", &estimate, &truth, option].map(String::from);
+        assert_eq!(egomotion(files).code, 2, "{option}");
+    }
 }

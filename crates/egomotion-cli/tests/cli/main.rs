@@ -16,6 +16,7 @@ mod outputs;
 mod process;
 mod recording;
 mod selection;
+mod settings;
 mod simulate;
 mod study;
 mod table;

@@ -7,10 +7,26 @@ use std::path::{Path, PathBuf};
 use super::FrameFiles;
 use crate::{IoError, image};
 
-/// The PNG files of a folder by the key that `key` finds in their stems; empty if there is no such folder.
+/// The images of a folder by the key that `key` finds in their stems; empty if there is no such folder.
 pub(super) fn numbered<K: Ord>(
     folder: &Path,
     key: impl Fn(&str) -> Option<K>,
+) -> Result<BTreeMap<K, PathBuf>, IoError> {
+    by_key(folder, key, image::is_named_like_one)
+}
+
+/// The text files of a folder in the same way.
+pub(super) fn texts<K: Ord>(
+    folder: &Path,
+    key: impl Fn(&str) -> Option<K>,
+) -> Result<BTreeMap<K, PathBuf>, IoError> {
+    by_key(folder, key, |path| path.extension() == Some(OsStr::new("txt")))
+}
+
+fn by_key<K: Ord>(
+    folder: &Path,
+    key: impl Fn(&str) -> Option<K>,
+    is_one: impl Fn(&Path) -> bool,
 ) -> Result<BTreeMap<K, PathBuf>, IoError> {
     let mut files = BTreeMap::new();
     if !folder.is_dir() {
@@ -19,8 +35,7 @@ pub(super) fn numbered<K: Ord>(
     let failed = |error: std::io::Error| IoError::system(folder, "list", &error);
     for entry in folder.read_dir().map_err(failed)? {
         let path = entry.map_err(failed)?.path();
-        let stem =
-            path.file_stem().and_then(OsStr::to_str).filter(|_| path.extension() == Some(OsStr::new("png")));
+        let stem = path.file_stem().and_then(OsStr::to_str).filter(|_| is_one(&path));
         if let Some(key) = stem.and_then(&key) {
             files.insert(key, path);
         }

@@ -1,5 +1,6 @@
 //! Least median of squares, equations (58) and (59).
 
+use documented::DocumentedFields;
 use nalgebra::SVector;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -12,7 +13,7 @@ pub use super::median_search::{Search, plain_search, search};
 use super::{Fit, NormalEquations, Row, Unsolvable, median};
 
 /// How least median of squares searches and refits.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
 pub struct LmedsOptions {
     /// Probability P that at least one subset is free of outliers.

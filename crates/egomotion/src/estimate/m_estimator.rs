@@ -1,12 +1,13 @@
 //! Robust regression by iteratively reweighted least squares with Student's t.
 
+use documented::DocumentedFields;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use super::{Fit, NormalEquations, Row, Unsolvable, median};
 
 /// Student's t as the distribution of residuals: heavy tails instead of a cut.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
 pub struct StudentT {
     /// Degrees of freedom ν; small is heavy-tailed, infinite is Gaussian.

@@ -2,6 +2,7 @@
 
 use nalgebra::{ArrayStorage, Matrix3, Matrix6, SMatrix, Vector3, Vector4};
 
+use super::median;
 use super::step::{self, Step, Weighing};
 use crate::geometry::gaussian::{accumulate, product};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
@@ -225,4 +226,19 @@ impl Measurement for StereoFlow {
     ) -> Vec<(usize, Step)> {
         step::of_flows(observations, structures, at, weighing)
     }
+}
+
+/// q of every observation in front of the camera, with the structure held at its measured value (the Sampson form).
+pub(super) fn squares<M: Measurement>(observations: &[M], at: &At<'_>) -> Vec<f64> {
+    let square = |o: &M| {
+        let l = o.linearise(&mut o.structure(), at)?;
+        Some(l.misclosure.dot(&(l.inverse_cov * l.misclosure)))
+    };
+    observations.iter().filter_map(square).collect()
+}
+
+/// The median of q at a motion; infinite without observations.
+pub(super) fn median_square<M: Measurement>(phi: &Twist, sample: &[M], rig: &StereoRig) -> f64 {
+    let middle = median(&mut squares(sample, &At::new(*phi, rig)));
+    if middle.is_nan() { f64::INFINITY } else { middle }
 }

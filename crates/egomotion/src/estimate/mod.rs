@@ -11,6 +11,7 @@ pub mod measurement;
 pub mod median_search;
 pub mod mixture;
 pub mod observability;
+pub mod robust_start;
 pub mod row;
 mod step;
 pub mod systematic;

@@ -10,8 +10,7 @@ use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
 
 use super::Observability;
 use super::m_estimator::StudentT;
-use super::maximum_likelihood::squares;
-use super::measurement::{At, Measurement};
+use super::measurement::{At, Measurement, squares};
 use super::mixture::Mixture;
 use super::step::{Step, Sums, Weighing};
 use crate::geometry::{StereoRig, Twist};

@@ -1,5 +1,6 @@
 //! Time to impact: the inverse of looming, and the window through which what is an obstacle passes.
 
+use documented::DocumentedFields;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -40,7 +41,7 @@ impl TimeToImpact {
 }
 
 /// The window, in metres around the left camera's axis, that the vehicle sweeps: what crosses it is an obstacle.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
 pub struct VehicleWindow {
     /// Left edge (X, negative is left).

@@ -9,6 +9,7 @@
 //! as long as it is found. Its window is taken anew in every frame. Nothing drifts, because a
 //! pair's motion is measured between two places of the same window, whatever corner it once was.
 
+use documented::DocumentedFields;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -22,7 +23,7 @@ use super::stereo_pyramid::StereoPyramid;
 use crate::geometry::{Field, Gaussian, Grid, StereoRig, Twist, upper_median};
 
 /// How corners are found and followed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackOptions {
     /// About how many corners are followed.

@@ -1,5 +1,6 @@
 //! Every choice and every default, once.
 
+use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -7,6 +8,7 @@ use crate::estimate::lmeds::LmedsOptions;
 use crate::estimate::m_estimator::StudentT;
 use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
 use crate::motion::impact::VehicleWindow;
+use crate::observe::disparity::AreaOptions;
 use crate::observe::flow::FlowError;
 use crate::observe::{DisparityOptions, FlowOptions, TrackOptions};
 
@@ -63,7 +65,7 @@ pub enum Observe {
 }
 
 /// Everything that can be chosen in a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
 pub struct Config {
     /// Which equations determine φ.
@@ -114,6 +116,25 @@ impl Default for Config {
             lmeds: LmedsOptions::default(),
             maximum_likelihood: MaximumLikelihoodOptions::default(),
         }
+    }
+}
+
+/// The meaning of a setting by its path, as `["flow", "fill"]`: its documentation.
+pub fn meaning(path: &[&str]) -> Option<&'static str> {
+    fn of<T: DocumentedFields>(name: &str) -> Option<&'static str> {
+        T::get_field_docs(name).ok()
+    }
+    match path {
+        [name] => of::<Config>(name),
+        ["window", name] => of::<VehicleWindow>(name),
+        ["tracks", name] => of::<TrackOptions>(name),
+        ["disparity", name] => of::<DisparityOptions>(name),
+        ["disparity", "area", name] => of::<AreaOptions>(name),
+        ["flow", name] => of::<FlowOptions>(name),
+        ["irls", name] | ["maximum_likelihood", "kernel", name] => of::<StudentT>(name),
+        ["lmeds", name] => of::<LmedsOptions>(name),
+        ["maximum_likelihood", name] => of::<MaximumLikelihoodOptions>(name),
+        _ => None,
     }
 }
 

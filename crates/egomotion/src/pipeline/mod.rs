@@ -11,7 +11,7 @@ pub mod solve;
 pub mod stereo;
 pub mod trajectory;
 
-pub use config::{Approach, Config, ConfigError, EstimatorKind, Method, Observe};
+pub use config::{Approach, Config, ConfigError, EstimatorKind, Method, Observe, meaning};
 pub use groups::MovingGroup;
 pub use stereo::{FrameMotion, StereoFrame, StereoMotion, Unanswered};
 pub use trajectory::Trajectory;

@@ -5,6 +5,7 @@
 //! each column are kept from row to row, the sum of a window from pixel to pixel, so that the time
 //! depends on the number of levels alone and not on the window.
 
+use documented::DocumentedFields;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +28,7 @@ const MISFIT: f32 = 1.7;
 const MODEL_SIGMA_PX: f32 = 0.05;
 
 /// How areas are correlated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
 pub struct AreaOptions {
     /// Half width of the square window, at most 10 pixels.

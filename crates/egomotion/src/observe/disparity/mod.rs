@@ -20,6 +20,7 @@ mod subpixel;
 mod surface;
 mod sweep;
 
+use documented::DocumentedFields;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -41,7 +42,7 @@ pub enum Matcher {
 }
 
 /// How disparity is found. Penalties are in bits of the census words' Hamming distance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisparityOptions {
     /// Disparities tried: 0 … `levels` − 1 pixels. Limited to the image's width.

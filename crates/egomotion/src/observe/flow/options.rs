@@ -1,10 +1,11 @@
 //! Settings of the dense flow.
 
 use super::{FlowError, search};
+use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`dense_flow`](super::dense_flow); grey levels are those of 8-bit images.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
 pub struct FlowOptions {
     /// Distance of neighbouring 8×8 patches, 1 … 8 pixels of each level; smaller is slower and denser.

@@ -10,9 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::measure::{Chosen, differential, discrete};
 use super::site::Site;
 use super::tally::Tally;
-use crate::estimate::maximum_likelihood::{
-    MaximumLikelihoodOptions, efficient, maximum_likelihood, robust_start,
-};
+use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, efficient, maximum_likelihood};
+use crate::estimate::robust_start::robust_start;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Gaussian, StereoRig, Twist};
 use crate::observe::{StereoFlow, StereoTrack};

@@ -1,0 +1,58 @@
+//! Whether φ's covariance is true on a real recording, whose own truth is too coarse to tell.
+//!
+//! Two runs see disjoint checkerboards of the image, so that their errors are independent but for what all matches
+//! share, which cancels: the squared difference of the two motions, in units of their summed covariance, is one for
+//! each degree of freedom.
+#![allow(missing_docs)]
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use egomotion::geometry::{Gaussian, Grid};
+use egomotion::metrics::Nees;
+use egomotion::pipeline::{Config, Observe, StereoFrame, StereoMotion};
+use egomotion_io::source::Sequence;
+use egomotion_io::{IoError, Source, image};
+use nalgebra::Vector6;
+
+/// Side of a square of the board, in pixels.
+const CELL_PX: usize = 64;
+
+/// φ of every pair, seen through the squares of one colour.
+fn motions(sequence: &Sequence, colour: usize) -> Result<Vec<Option<Gaussian<6>>>, IoError> {
+    let rig = sequence.rig.unwrap();
+    let mut config = Config { observe: Observe::Sparse, ..Config::default() };
+    // What both halves share is not in their difference.
+    config.maximum_likelihood.phase_error_px = 0.0;
+    let mut pipeline = StereoMotion::new(rig, config).unwrap();
+    let hidden = |u: usize, v: usize| (u / CELL_PX + v / CELL_PX) % 2 != colour;
+    pipeline.set_mask(Some(Grid::from_fn(rig.width_px, rig.height_px, hidden)));
+    let motion = |files: &egomotion_io::source::FrameFiles| {
+        let (left, right) = (image::read(&files.left)?, image::read(files.right.as_ref().unwrap())?);
+        let motion = pipeline.push(StereoFrame { time_s: files.time_s, left, right }).motion;
+        Ok(motion.ok().filter(|estimate| estimate.is_complete()).map(|estimate| estimate.theta))
+    };
+    sequence.frames.iter().map(motion).collect()
+}
+
+#[test]
+fn halves_of_kitti_differ_as_their_covariances_say() -> Result<(), IoError> {
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
+    let data = std::env::var_os("EGOMOTION_DATA").map_or_else(|| PathBuf::from(default), PathBuf::from);
+    let folder = data.join("kitti_odometry/sequences/06");
+    if !folder.exists() {
+        // Not `println!`, which the test harness hides when a test passes.
+        let _ = writeln!(std::io::stdout(), "SKIPPED split halves: {} is missing", folder.display());
+        return Ok(());
+    }
+    let source = Source::open(&folder)?;
+    let [white, black] = [0, 1].map(|colour| motions(&source.sequences[0], colour));
+    let mut nees = Nees::default();
+    for (a, b) in white?.into_iter().zip(black?).filter_map(|(a, b)| a.zip(b)) {
+        nees.add(&Gaussian { mean: a.mean - b.mean, cov: a.cov + b.cov }, &Vector6::zeros());
+    }
+    let found = nees.per_degree().unwrap();
+    println!("NEES/6 {found} ± {:?}", nees.standard_error());
+    assert!((0.7..=1.4).contains(&found), "{found}");
+    Ok(())
+}
