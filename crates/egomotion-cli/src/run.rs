@@ -64,6 +64,7 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
         scenes,
     };
     folder.write_json("summary.json", &index)?;
+    folder.write_index(&terminal::command_line(), &index)?;
     if args.json {
         writeln!(terminal::stdout(), "{}", serde_json::to_string_pretty(&index)?)?;
     }
