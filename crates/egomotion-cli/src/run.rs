@@ -172,7 +172,7 @@ fn run_sequence(
     summary.truth_maps = truth_maps;
     folder.write_json("summary.json", &summary)?;
     let about = About {
-        title: &sequence.name,
+        title: &format!("How the camera moved: {}", sequence.name),
         source: &summary.source,
         command: terminal::command_line(),
         config,

@@ -126,7 +126,9 @@ impl Session<'_> {
                 let writing = Instant::now();
                 let earlier = reference_image.as_ref().filter(|(f, _)| Some(*f) == reference);
                 look(&row)?;
-                if let (Some(dense), Some((r, image)), Some(dt_s)) = (&row.motion.dense, earlier, row.motion.dt_s) {
+                if let (Some(dense), Some((r, image)), Some(dt_s)) =
+                    (&row.motion.dense, earlier, row.motion.dt_s)
+                {
                     let index = rows.get(*r).map_or(*r, |row| row.index);
                     let width_px = album.width_px(image.size());
                     album.offer(|| FramePictures::new(index, rows.len(), image, dense, dt_s, width_px));

@@ -42,6 +42,7 @@ pub fn reasons(rows: &[FrameRow]) -> Vec<(NoObstacle, usize)> {
             None => reasons.push((why, 1)),
         }
     }
+    reasons.sort_by_key(|(why, _)| letter(*why));
     reasons
 }
 

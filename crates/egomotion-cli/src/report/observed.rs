@@ -53,10 +53,8 @@ pub fn sentence(report: &Report<'_>) -> Option<String> {
 /// Kept measurements over time, between zero and all.
 pub fn measurements(timeline: &Timeline<'_>, series: &Series) -> Markup {
     let top = extent(series.values.iter().flatten().map(|v| v.high)).map_or(1.0, |(_, hi)| 1.1 * hi);
-    let axes = Axes {
-        x: time_scale(timeline, SIZE),
-        y: Scale::linear((0.0, top), (SIZE.1 - MARGIN[3], MARGIN[2])),
-    };
+    let axes =
+        Axes { x: time_scale(timeline, SIZE), y: Scale::linear((0.0, top), (SIZE.1 - MARGIN[3], MARGIN[2])) };
     let [left, _, width, _] = axes.inside();
     html! {
         svg viewBox=(view_box(SIZE)) role="img" aria-label="measurements over time" data-series=(series.id)
@@ -81,7 +79,10 @@ pub fn lanes(report: &Report<'_>, timeline: &Timeline<'_>) -> Markup {
     let (counts, answered) = counts(report.frames);
     // Room for the words at the left, and for how often at the right.
     let (left, right) = (84.0, SIZE.0 - 62.0);
-    let axes = Axes { x: Scale::linear(timeline.range, (left, right)), y: Scale::linear((0.0, 6.0), (6.0 * LANE, 0.0)) };
+    let axes = Axes {
+        x: Scale::linear(timeline.range, (left, right)),
+        y: Scale::linear((0.0, 6.0), (6.0 * LANE, 0.0)),
+    };
     let wide = ((right - left) / timeline.times.len().max(1) as f64).max(0.6);
     let marks = |i: usize, wanted: bool| -> String {
         let there = |row: &FrameRow| row.motion.as_ref().is_some_and(|motion| motion.observed[i] == wanted);

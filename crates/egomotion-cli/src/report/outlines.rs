@@ -47,9 +47,9 @@ pub fn words(report: &Report<'_>, stops: &[Stop]) -> Markup {
         @for (k, stop) in stops.iter().enumerate() {
             @if let Some(row) = report.frames.get(stop.row) {
                 ul data-k=(k) class=(if k == 0 { "on" } else { "" }) {
-                    li class="obstacle" { (nearest(row)) }
+                    li class=(if row.impact().is_some() { "obstacle" } else { "" }) { (nearest(row)) }
                     @for (n, group) in row.moving.iter().take(MOST_GROUPS).enumerate() {
-                        li class="moving" { b { (n + 1) } " " (moving(row, group)) }
+                        li class="moving" { b { (n + 1) } ": " (moving(row, group)) }
                     }
                     @if row.moving.len() > MOST_GROUPS { li { "and " (row.moving.len() - MOST_GROUPS) " smaller ones" } }
                 }
@@ -72,8 +72,9 @@ fn moving(row: &FrameRow, group: &MovingGroup) -> String {
         format!(", VZ {} ± {} m/s", significant(value, 3), significant(2.0 * sigma, 2))
     });
     let impact = group.impact.as_ref().and_then(Interval::of_impact);
-    let impact = impact.map_or("does not come nearer".into(), |seconds| format!("reached {}", in_seconds(&seconds)));
-    format!("moves by itself: {} m away{vz}, {impact}", significant(group.depth_m, 3))
+    let impact =
+        impact.map_or("comes no nearer".into(), |seconds| format!("reached {}", in_seconds(&seconds)));
+    format!("{} m away{vz}, {impact}", significant(group.depth_m, 3))
 }
 
 /// When something is reached, with its interval.

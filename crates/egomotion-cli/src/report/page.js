@@ -42,7 +42,7 @@
     document.addEventListener('keydown', event => {
       const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
       const plain = !(event.altKey || event.ctrlKey || event.metaKey || event.shiftKey);
-      if (!step || !plain || event.target.closest('input, select, textarea, pre, .scroll')) return;
+      if (!step || !plain || event.target.closest('input, pre, .scroll')) return;
       event.preventDefault();
       stop();
       show(shown + step);

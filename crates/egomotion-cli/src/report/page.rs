@@ -4,7 +4,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::series::{Series, Timeline};
 use super::trajectory::Path;
-use super::{Report, Stop, body, charts, data, impact, observed, phi, player, summary, tables, trouble, viewer};
+use super::{
+    Report, Stop, body, charts, data, impact, observed, phi, player, summary, tables, trouble, viewer,
+};
 use crate::chart::PAGE_STYLE;
 use crate::chart::number::{fixed, significant};
 
@@ -30,7 +32,8 @@ pub fn render(report: &Report<'_>) -> String {
     let kept = observed::series(&timeline);
     let height = path.height(report, &timeline);
     let errors: Vec<Series> = phi.iter().filter_map(Series::errors).collect();
-    let named: Vec<&Series> = body.iter().chain(&phi).chain(&errors).chain([&impact, &kept, &height]).collect();
+    let named: Vec<&Series> =
+        body.iter().chain(&phi).chain(&errors).chain([&impact, &kept, &height]).collect();
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -56,9 +59,9 @@ pub fn render(report: &Report<'_>) -> String {
                         (above(report, &path))
                         div { (heights(report, &timeline, &height)) (impacts(report, &timeline, &impact)) }
                     }
-                    (velocities(&timeline, &body))
+                    (velocities(report, &timeline, &body))
                     div class="pair" { (determined(report, &timeline, &kept)) (times(report)) }
-                    (scene_motion(&timeline, &phi))
+                    (scene_motion(report, &timeline, &phi))
                     (numbers(report))
                     (repeat(report))
                 }
@@ -83,7 +86,7 @@ fn troubles(report: &Report<'_>) -> Markup {
         @if all.is_empty() {
             @if let Some(well) = trouble::all_well(report) { p class="well" { (well) } }
         } @else {
-            ul class="notes" { @for sentence in &all { li { (sentence) } } }
+            div class="notes" { p { b { "What to know before trusting it" } } ul { @for sentence in &all { li { (sentence) } } } }
         }
     }
 }
@@ -129,7 +132,7 @@ fn impacts(report: &Report<'_>, timeline: &Timeline<'_>, series: &Series) -> Mar
             p { "Until the first thing in the vehicle's way is reached if nothing changes its motion." }
             @match impact::chart(timeline, series, &reasons) {
                 Some(chart) => {
-                    (legend(&[("line", "time to impact"), ("interval", "95 % interval; fading upwards: no upper end")]))
+                    (legend(&[("line", "time to impact"), ("interval", "95 % interval; fainter: no upper end")]))
                     (chart)
                 }
                 None => p class="empty" { "Nothing in the way approached in this run." },
@@ -139,11 +142,12 @@ fn impacts(report: &Report<'_>, timeline: &Timeline<'_>, series: &Series) -> Mar
     }
 }
 
-fn velocities(timeline: &Timeline<'_>, body: &[Series]) -> Markup {
+fn velocities(report: &Report<'_>, timeline: &Timeline<'_>, body: &[Series]) -> Markup {
     html! {
         section id="velocity" {
             h2 { "How the camera moved, per second" }
             p { "Its own velocity and turning rate, as a driver would name them. The shaded band holds the true value 95 times out of 100; where it cannot be seen it is thinner than the line." }
+            (legend(&standard(report)))
             (body::charts(timeline, body))
         }
     }
@@ -178,7 +182,7 @@ fn times(report: &Report<'_>) -> Markup {
     }
 }
 
-fn scene_motion(timeline: &Timeline<'_>, phi: &[Series]) -> Markup {
+fn scene_motion(report: &Report<'_>, timeline: &Timeline<'_>, phi: &[Series]) -> Markup {
     let truth = phi.iter().any(|series| series.truths.iter().any(Option::is_some));
     html! {
         section id="phi" {
@@ -188,6 +192,7 @@ fn scene_motion(timeline: &Timeline<'_>, phi: &[Series]) -> Markup {
                 b { "t" } " (X right, Y down, Z ahead) and three turns " b { "Ω" } " about these axes, over the interval that ends at each frame."
                 @if truth { " The strip below each chart shows how far off the estimate is, against its own band." }
             }
+            (legend(&standard(report)))
             (phi::charts(timeline, phi))
         }
     }

@@ -16,6 +16,8 @@ const JPEG_QUALITY: u8 = 70;
 
 /// Palette entries that hold values; entry 0 is a missing pixel. Few, so that the page stays small.
 const LEVELS: u8 = 48;
+/// The same of a σ, which varies from pixel to pixel and is read coarsely: half the bytes.
+const SIGMA_LEVELS: u8 = 16;
 
 /// The maps, each quantity followed by its σ.
 pub const QUANTITIES: [Quantity; 6] = [
@@ -56,6 +58,7 @@ pub struct FramePictures {
 #[derive(Debug, Clone, PartialEq)]
 struct MapPicture {
     png: Vec<u8>,
+    levels: u8,
     /// Coordinates of the first and the last level.
     ends: (f64, f64),
     /// Coordinates between which nearly all pixels lie; `None` without a value.
@@ -70,7 +73,14 @@ impl FramePictures {
     }
 
     /// The left image and the maps of a frame pair that lies `dt_s` apart.
-    pub fn new(frame: usize, row: usize, left: &Image, dense: &DenseResults, dt_s: f64, width_px: usize) -> Self {
+    pub fn new(
+        frame: usize,
+        row: usize,
+        left: &Image,
+        dense: &DenseResults,
+        dt_s: f64,
+        width_px: usize,
+    ) -> Self {
         let plane = |i: usize| match i {
             0 => map(dense.disparity.shift.grid(), 1.0, i, width_px),
             1 => map(dense.disparity.sigma.grid(), 1.0, i, width_px),
@@ -135,18 +145,19 @@ fn map(plane: &Grid<f32>, factor: f64, i: usize, width_px: usize) -> MapPicture 
     let between = |low: f64, high: f64| quantile(&present, low).zip(quantile(&present, high));
     let ends = between(0.005, 0.995).unwrap_or((0.0, 1.0));
     let (low, high) = ends;
+    let levels = if i % 2 == 0 { LEVELS } else { SIGMA_LEVELS };
     let level = |c: f64| {
         let share = if high > low { (c - low) / (high - low) } else { 0.5 };
-        1 + (share.clamp(0.0, 1.0) * f64::from(LEVELS - 1)).round() as u8
+        1 + (share.clamp(0.0, 1.0) * f64::from(levels - 1)).round() as u8
     };
     let (width, height) = coordinates.size();
     let indices = Grid::from_fn(width, height, |u, v| {
         let c = coordinates.at(u, v);
         if c.is_finite() { level(c) } else { 0 }
     });
-    let placeholder = vec![[0; 3]; LEVELS.into()];
+    let placeholder = vec![[0; 3]; levels.into()];
     let png = encode(&indices, Some(&placeholder)).unwrap_or_default();
-    MapPicture { png, ends, range: between(0.02, 0.98) }
+    MapPicture { png, levels, ends, range: between(0.02, 0.98) }
 }
 
 impl MapPicture {
@@ -154,10 +165,10 @@ impl MapPicture {
     fn palette(&self, map: ColourMap, common: (f64, f64)) -> Vec<Rgb> {
         let (low, high) = self.ends;
         let share = |k: u8| {
-            let coordinate = low + (high - low) * f64::from(k) / f64::from(LEVELS - 1);
+            let coordinate = low + (high - low) * f64::from(k) / f64::from(self.levels - 1);
             (coordinate - common.0) / (common.1 - common.0)
         };
-        std::iter::once([0; 3]).chain((0..LEVELS).map(|k| map.at(share(k)))).collect()
+        std::iter::once([0; 3]).chain((0..self.levels).map(|k| map.at(share(k)))).collect()
     }
 }
 

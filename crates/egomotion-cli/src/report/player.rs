@@ -25,14 +25,24 @@ fn says(report: &Report<'_>, stops: &[Stop]) -> Markup {
     html! {
         @for (k, stop) in stops.iter().enumerate() {
             @if let (Some(row), Some(time)) = (report.frames.get(stop.row), times.get(stop.row)) {
-                span data-k=(k) class=(if k == 0 { "on" } else { "" }) { (line(report, row, *time)) }
+                span data-k=(k) class=(if k == 0 { "on" } else { "" }) { (line(report, row, before(report, stop), *time)) }
             }
         }
     }
 }
 
-fn line(report: &Report<'_>, row: &FrameRow, time: f64) -> String {
-    let mut parts = vec![format!("frame {}", row.frame), format!("{} s", fixed(time, 2))];
+/// The frame that is pictured.
+fn before(report: &Report<'_>, stop: &Stop) -> Option<usize> {
+    Some(report.album.pictures().get(stop.picture?)?.frame)
+}
+
+/// The pair of frames: the pictures are those of the earlier one.
+fn frames(row: &FrameRow, before: Option<usize>) -> String {
+    before.map_or_else(|| format!("frame {}", row.frame), |before| format!("frames {before} → {}", row.frame))
+}
+
+fn line(report: &Report<'_>, row: &FrameRow, before: Option<usize>, time: f64) -> String {
+    let mut parts = vec![frames(row, before), format!("{} s", fixed(time, 2))];
     let unit = body::speed_unit(report.frames);
     match body::speed_m_s(row) {
         Some(speed) => parts.push(format!("{} {}/s", significant(speed * unit.factor, 3), unit.name)),

@@ -97,8 +97,9 @@ pub mod tests {
         let mut run = Run::of(&phis);
         run.rows[2].motion = None;
         run.rows[2].status = "few_rows".into();
-        let known =
-            |run: &Run| covariances(&run.report(&Album::of(9))).iter().map(Option::is_some).collect::<Vec<_>>();
+        let known = |run: &Run| {
+            covariances(&run.report(&Album::of(9))).iter().map(Option::is_some).collect::<Vec<_>>()
+        };
         assert_eq!(known(&run), [true, true, true, false, false]);
         run.rows[3].dt_s = Some(0.2);
         assert_eq!(known(&run), [true; 5]);

@@ -29,7 +29,8 @@ impl<'a> Timeline<'a> {
     pub fn of(report: &Report<'a>) -> Self {
         let (times, name) = report.times();
         let step = times.len().div_ceil(MOST_POINTS).max(1);
-        let unanswered = report.frames.iter().zip(&times).filter(|(row, _)| row.asks() && row.motion.is_none());
+        let unanswered =
+            report.frames.iter().zip(&times).filter(|(row, _)| row.asks() && row.motion.is_none());
         let (first, last) = times.first().zip(times.last()).map_or((0.0, 1.0), |(a, b)| (*a, *b));
         let room = if last > first { 0.5 * (last - first) / times.len().max(2) as f64 } else { 0.5 };
         Self {

@@ -121,7 +121,8 @@ fn fast(report: &Report<'_>, body: &[Series]) -> Option<Figure> {
     let speeds = || report.frames.iter().filter_map(body::speed_m_s);
     let (low, high) = crate::chart::plot::extent(speeds())?;
     let unit = length(high);
-    let known = |k: usize| body.get(k).map(|s| (s.usual_band(), s.unit.clone())).filter(|(b, _)| b.is_finite());
+    let known =
+        |k: usize| body.get(k).map(|s| (s.usual_band(), s.unit.clone())).filter(|(b, _)| b.is_finite());
     let mut beside = Vec::new();
     if let Some((band, unit)) = known(0) {
         beside.push(format!("forward speed known to ±{} {unit} in each frame (95 %)", significant(band, 2)));
@@ -142,7 +143,9 @@ fn soonest(report: &Report<'_>) -> Option<Figure> {
     match report.frames.iter().filter_map(of).min_by(|a, b| a.0.value.total_cmp(&b.0.value)) {
         Some((seconds, frame)) => {
             let between = match seconds.high.is_finite() {
-                true => format!("{} … {} s (95 %)", significant(seconds.low, 3), significant(seconds.high, 3)),
+                true => {
+                    format!("{} … {} s (95 %)", significant(seconds.low, 3), significant(seconds.high, 3))
+                }
                 false => format!("not before {} s (95 %)", significant(seconds.low, 3)),
             };
             let beside = vec![between, format!("at frame {frame}, if nothing changed")];
@@ -159,16 +162,18 @@ fn soonest(report: &Report<'_>) -> Option<Figure> {
 
 /// Against the truth: how far off, and whether the stated uncertainty is true.
 fn checked(report: &Report<'_>) -> Option<Figure> {
-    let name = "Checked against truth";
     let (share, components) = trouble::coverage(report)?;
-    let mut beside = vec![format!("of {components} true values lie in their 95 % band")];
-    if let Some(error) = relative_pose_error(report.poses, report.truth?) {
-        let unit = length(error.t_rmse_m);
-        beside.push(format!(
-            "off by {} and {}° a frame (root mean square)",
-            unit.show(error.t_rmse_m * unit.factor, 2),
-            significant(error.r_rmse_deg, 2)
-        ));
-    }
-    Some(Figure { name, value: format!("{} %", significant(100.0 * share, 3)), beside })
+    let within = format!("{} %", significant(100.0 * share, 3));
+    let band = format!("{within} of {components} true values lie in their 95 % band");
+    let name = "Off the truth";
+    let Some(error) = relative_pose_error(report.poses, report.truth?) else {
+        return Some(Figure { name, value: "–".into(), beside: vec![band] });
+    };
+    let unit = length(error.t_rmse_m);
+    let value = unit.show(error.t_rmse_m * unit.factor, 2);
+    let beside = vec![
+        format!("and {}° from frame to frame (root mean square)", significant(error.r_rmse_deg, 2)),
+        band,
+    ];
+    Some(Figure { name, value, beside })
 }

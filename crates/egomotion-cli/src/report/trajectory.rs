@@ -80,7 +80,8 @@ impl<'a> Path<'a> {
     /// Height above the start over time.
     pub fn height(&self, report: &Report<'_>, timeline: &Timeline<'_>) -> Series {
         let all = self.poses.iter().chain(&self.truth);
-        let unit: Unit = length(all.map(|p| p.translation.y.abs()).filter(|y| y.is_finite()).fold(0.0, f64::max));
+        let unit: Unit =
+            length(all.map(|p| p.translation.y.abs()).filter(|y| y.is_finite()).fold(0.0, f64::max));
         let step = report.frames.len().div_ceil(timeline.rows.len().max(1)).max(1);
         let value = |k: usize| {
             // Y points down.
@@ -88,7 +89,8 @@ impl<'a> Path<'a> {
             let sigma = self.covariances.get(k)?.map_or(f64::INFINITY, |cov| cov[(1, 1)].sqrt());
             height.is_finite().then(|| Interval::around(height, sigma * unit.factor))
         };
-        let truth = |k: usize| Some(-self.truth.get(k)?.translation.y * unit.factor).filter(|y| y.is_finite());
+        let truth =
+            |k: usize| Some(-self.truth.get(k)?.translation.y * unit.factor).filter(|y| y.is_finite());
         let rows = || (0..report.frames.len()).step_by(step);
         Series {
             id: "height".into(),

@@ -1,10 +1,13 @@
 //! What went wrong, in plain words.
 
 use super::{Report, observed};
-use crate::chart::number::count;
+use crate::chart::number::{count, significant};
 
 /// Most frames that are named in a sentence.
 const MOST_NAMED: usize = 8;
+
+/// Bands that hold the truth less often than this are not what they say.
+const DOUBTFUL: f64 = 0.85;
 
 /// One sentence for each kind of trouble; none where all went well.
 pub fn trouble(report: &Report<'_>) -> Vec<String> {
@@ -15,6 +18,12 @@ pub fn trouble(report: &Report<'_>) -> Vec<String> {
     all.extend(unanswered(report));
     all.extend(partial(report));
     all.extend(report.notes.iter().cloned());
+    if let Some((share, components)) = coverage(report).filter(|(share, _)| *share < DOUBTFUL) {
+        all.push(format!(
+            "Of {components} true values only {} % lie in their 95 % band: the truth is less exact than the estimate, or the stated uncertainty is too small.",
+            significant(100.0 * share, 2)
+        ));
+    }
     all
 }
 

@@ -27,8 +27,8 @@ pub fn viewer(report: &Report<'_>, stops: &[Stop]) -> Markup {
                 @if report.sparse { "This run followed corners alone (" code { "--observe sparse" } "), which is fast but makes no maps of every pixel." }
             }
             @if maps {
-                fieldset class="switch" {
-                    legend { "The maps show" }
+                div class="switch" role="radiogroup" aria-label="The maps show" {
+                    span { "The maps show" }
                     label { input type="radio" name="layer" id="show-value" checked; " the quantity" }
                     label { input type="radio" name="layer" id="show-sigma"; " its uncertainty σ" }
                 }
@@ -36,11 +36,11 @@ pub fn viewer(report: &Report<'_>, stops: &[Stop]) -> Markup {
             @if let Some((_, first)) = pictures.first() {
                 div class=(if maps { "panels" } else { "panels one" }) {
                     figure {
-                        figcaption { b { "Left image" } }
+                        figcaption { b { "Left image" } " " span class="unit" { "framed: moves by itself; dashed: the nearest obstacle" } }
                         (stack(&pictures, "left image", first.size(), outlines::overlay(report, stops), |p| {
                             Some(("jpeg", p.left_jpeg().to_vec())).filter(|(_, jpeg)| !jpeg.is_empty())
                         }))
-                        div class="words" { (outlines::words(report, stops)) }
+                        div class="words" tabindex="0" role="region" aria-label="what is outlined" { (outlines::words(report, stops)) }
                     }
                     @if maps { @for i in (0..QUANTITIES.len()).step_by(2) { (pair(report, &pictures, i, first.size())) } }
                 }
@@ -86,13 +86,15 @@ fn panel(
     size: (usize, usize),
 ) -> Markup {
     let range = quantity.spread.common(pictures.iter().filter_map(|(_, p)| p.range(i)));
+    // Most of a still scene moves alike: room beyond it shows what is faster.
+    let range = if quantity.spread == Spread::Symmetric { (1.4 * range.0, 1.4 * range.1) } else { range };
     let ends = (quantity.spread.value(range.0), quantity.spread.value(range.1));
     let scale = match quantity.spread {
         Spread::Logarithmic => Scale::log(ends, (0.0, 100.0)),
         Spread::Linear | Spread::Symmetric => Scale::linear(ends, (0.0, 100.0)),
     };
     let ticks: Vec<(f64, f64, String)> =
-        scale.ticks(5).into_iter().filter_map(|(v, label)| Some((v, scale.at(v)?, label))).collect();
+        scale.ticks(8).into_iter().filter_map(|(v, label)| Some((v, scale.at(v)?, label))).collect();
     let ticks = apart(ticks);
     html! {
         figcaption { b { (quantity.name) } " " span class="unit" { (quantity.unit) } }
@@ -120,7 +122,7 @@ fn panel(
 fn apart(ticks: Vec<(f64, f64, String)>) -> Vec<(f64, f64, String)> {
     let mut kept: Vec<(f64, f64, String)> = Vec::new();
     for tick in ticks {
-        if tick.1 < 84.0 && kept.last().is_none_or(|last| tick.1 - last.1 > 14.0) {
+        if tick.1 < 84.0 && kept.last().is_none_or(|last| tick.1 - last.1 > 11.0) {
             kept.push(tick);
         }
     }
