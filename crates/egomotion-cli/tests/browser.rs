@@ -97,7 +97,8 @@ fn seen(browser: &Path, page: &Path, width_px: u32) -> Value {
     let html = std::fs::read_to_string(page).unwrap();
     let head = html.find("<head>").unwrap() + "<head>".len();
     // The watch comes first, so that nothing escapes it; the page's policy does not forbid either.
-    let html = format!("{}{WATCH}{}", &html[..head], &html[head..]).replace("</body>", &format!("{USE}</body>"));
+    let html =
+        format!("{}{WATCH}{}", &html[..head], &html[head..]).replace("</body>", &format!("{USE}</body>"));
     let used = page.with_file_name("used.html");
     std::fs::write(&used, html).unwrap();
     let profile = TempDir::new().unwrap();
@@ -112,8 +113,10 @@ fn seen(browser: &Path, page: &Path, width_px: u32) -> Value {
         .output()
         .unwrap();
     let dom = String::from_utf8_lossy(&output.stdout);
-    let title = dom.split("<title>").nth(1).and_then(|rest| rest.split("</title>").next()).unwrap_or_default();
-    let title = title.replace("&lt;", "<").replace("&gt;", ">").replace("&nbsp;", "\u{a0}").replace("&amp;", "&");
+    let title =
+        dom.split("<title>").nth(1).and_then(|rest| rest.split("</title>").next()).unwrap_or_default();
+    let title =
+        title.replace("&lt;", "<").replace("&gt;", ">").replace("&nbsp;", "\u{a0}").replace("&amp;", "&");
     serde_json::from_str(&title)
         .unwrap_or_else(|e| panic!("{e}: {title}\n{}", String::from_utf8_lossy(&output.stderr)))
 }
@@ -153,7 +156,10 @@ fn the_page_works_in_a_browser() {
         // Three charts of velocity rows and more follow, and so does the camera.
         assert!(list(&stops[0], "marks").len() > 12, "{seen}");
         let sigma = list(&seen["sigma"], "sources");
-        assert!(sigma.len() == 4 && sigma[1..].iter().all(|s| !list(&stops[1], "sources").contains(s)), "{seen}");
+        assert!(
+            sigma.len() == 4 && sigma[1..].iter().all(|s| !list(&stops[1], "sources").contains(s)),
+            "{seen}"
+        );
         assert_eq!((&seen["afterKey"], &seen["afterClick"]), (&1.into(), &0.into()));
         assert_eq!(seen["afterPlay"], 1);
         let tip = seen["tip"].as_str().unwrap();
@@ -166,7 +172,15 @@ fn without_maps_the_page_works_too() {
     let Some(browser) = browser() else { return };
     let folder = TempDir::new().unwrap();
     let (source, out) = (drive(folder.path()), folder.path().join("sparse"));
-    egomotion(&["run", source.to_str().unwrap(), "--out", out.to_str().unwrap(), "--quiet", "--observe", "sparse"]);
+    egomotion(&[
+        "run",
+        source.to_str().unwrap(),
+        "--out",
+        out.to_str().unwrap(),
+        "--quiet",
+        "--observe",
+        "sparse",
+    ]);
     let seen = seen(&browser, &out.join("report.html"), 1280);
     assert_quiet(&seen);
     let stops = list(&seen, "stops");

@@ -324,7 +324,7 @@ fn the_page_stays_small() {
     let long = render(&steady(5000).report(&Album::of(5001)));
     assert!(long.len() < 3_000_000, "{}", long.len());
     // Pure noise cannot be compressed, and still the pictures fit.
-    let (run, album) = (steady(30), album(30, (900, 700)));
+    let (run, album) = (steady(8), album(8, (900, 700)));
     let page = render(&run.report(&album));
     assert!(page.len() < 8_000_000, "{}", page.len());
     assert!(album.stride() > 1 && page.contains("Pictures are kept of"), "{}", album.stride());

@@ -219,6 +219,7 @@ fn half_axes(cov: &Matrix2<f64>) -> Option<[(f64, (f64, f64)); 2]> {
 
 #[cfg(test)]
 mod tests {
+    use egomotion::geometry::Twist;
     use nalgebra::Vector6;
 
     use super::super::position::tests::poses;
