@@ -49,28 +49,27 @@ for (const name of ['error', 'warn']) console[name] = (...all) => wrong.push(all
 const USE: &str = "<script>(async () => {
 const seen = { stops: [] };
 try {
+  // Decoding does not wait for virtual time; loading does.
+  if (document.readyState !== 'complete') await new Promise(done => addEventListener('load', done));
   const visible = e => e.getClientRects().length > 0;
   const images = () => [...document.querySelectorAll('.stack img')].filter(visible);
   const marks = () => [...document.querySelectorAll('.cursor, .camera')].map(e => e.getAttribute('transform'));
-  const look = async () => {
-    await Promise.all(images().map(i => i.decode()));
-    return {
+  const look = () => ({
       sources: images().map(i => i.src.length + i.src.slice(-80)),
       widths: images().map(i => i.naturalWidth),
       says: [...document.querySelectorAll('.player output span')].filter(visible).map(e => e.textContent),
       marks: marks(),
-    };
-  };
+  });
   const slider = document.getElementById('frame');
   for (let k = 0; slider && k <= +slider.max; k++) {
     slider.value = k;
     slider.dispatchEvent(new Event('input'));
-    seen.stops.push(await look());
+    seen.stops.push(look());
   }
   const key = name => document.body.dispatchEvent(new KeyboardEvent('keydown', { key: name, bubbles: true, cancelable: true }));
   if (slider) { key('ArrowLeft'); seen.afterKey = +slider.value; }
   const sigma = document.getElementById('show-sigma');
-  if (sigma) { sigma.click(); seen.sigma = await look(); }
+  if (sigma) { sigma.click(); seen.sigma = look(); }
   const chart = document.querySelector('svg[data-series=body-0]');
   const box = chart.getBoundingClientRect();
   const at = x => ({ clientX: box.left + x * box.width, clientY: box.top + 20, bubbles: true });

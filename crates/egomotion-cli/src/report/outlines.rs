@@ -14,7 +14,7 @@ const MOST_GROUPS: usize = 8;
 pub fn overlay(report: &Report<'_>, stops: &[Stop]) -> Markup {
     let (width, height) = (report.rig.width_px, report.rig.height_px);
     // Text as large as in a chart when the image is shown small.
-    let font = width as f64 / 26.0;
+    let font = width as f64 / 34.0;
     html! {
         svg class="overlay" viewBox=(format!("0 0 {width} {height}")) aria-hidden="true" style=(format!("font-size:{font:.0}px")) {
             @for (k, stop) in stops.iter().enumerate() {

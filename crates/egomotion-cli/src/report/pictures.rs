@@ -145,7 +145,7 @@ fn map(plane: &Grid<f32>, factor: f64, i: usize, width_px: usize) -> MapPicture 
     let between = |low: f64, high: f64| quantile(&present, low).zip(quantile(&present, high));
     let ends = between(0.005, 0.995).unwrap_or((0.0, 1.0));
     let (low, high) = ends;
-    let levels = if i % 2 == 0 { LEVELS } else { SIGMA_LEVELS };
+    let levels = if i.is_multiple_of(2) { LEVELS } else { SIGMA_LEVELS };
     let level = |c: f64| {
         let share = if high > low { (c - low) / (high - low) } else { 0.5 };
         1 + (share.clamp(0.0, 1.0) * f64::from(levels - 1)).round() as u8

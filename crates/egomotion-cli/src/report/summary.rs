@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::series::Series;
 use super::trajectory::Path;
 use super::{FrameRow, Report, body, impact, trouble};
-use crate::chart::number::{count, length, significant};
+use crate::chart::number::{Unit, count, length, significant};
 
 /// One figure: what it is, its value, and what else to know.
 struct Figure {
@@ -71,8 +71,7 @@ fn distance(report: &Report<'_>) -> String {
 }
 
 /// A speed as people say it; from walking pace on in km/h too.
-fn in_words(speed_m_s: f64) -> String {
-    let unit = length(speed_m_s);
+fn in_words(speed_m_s: f64, unit: Unit) -> String {
     let value = format!("{}\u{a0}{}/s", significant(speed_m_s * unit.factor, 3), unit.name);
     if speed_m_s > 2.0 { format!("{value} ({} km/h)", significant(3.6 * speed_m_s, 2)) } else { value }
 }
@@ -81,7 +80,7 @@ fn in_words(speed_m_s: f64) -> String {
 fn mean_speed(report: &Report<'_>) -> Option<String> {
     let answered = report.frames.iter().filter_map(|row| Some((body::speed_m_s(row)?, row.interval_s()?)));
     let (way, time) = answered.fold((0.0, 0.0), |(way, time), (v, dt)| (way + v * dt, time + dt));
-    (time > 0.0).then(|| in_words(way / time))
+    (time > 0.0).then(|| in_words(way / time, body::speed_unit(report.frames)))
 }
 
 /// Where the camera faces at the end, against its start.

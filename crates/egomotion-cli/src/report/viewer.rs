@@ -114,7 +114,7 @@ fn panel(
                 span class="last" { "m away" }
             }
         }
-        @if i % 2 == 0 { p class="small" { (meaning(i)) } } @else { p class="small" { "the standard deviation: dark is sure" } }
+        @if i.is_multiple_of(2) { p class="small" { (meaning(i)) } } @else { p class="small" { "the standard deviation: dark is sure" } }
     }
 }
 
