@@ -134,15 +134,17 @@ fn sigma_s(impact: &TimeToImpact) -> Option<f64> {
 fn map(plane: &Grid<f32>, factor: f64, i: usize, width_px: usize) -> MapPicture {
     let spread = QUANTITIES[i].spread;
     let coordinates = reduce(plane, width_px, |block| {
-        let all: Vec<f32> = block.collect();
-        let mut present: Vec<f64> =
-            all.iter().filter(|v| v.is_finite()).map(|v| factor * f64::from(*v)).collect();
+        let (mut all, mut present) = (0, Vec::with_capacity(16));
+        for value in block {
+            all += 1;
+            present.extend(value.is_finite().then(|| factor * f64::from(value)));
+        }
         // A pixel of the picture is missing where most of what it stands for is.
-        let enough = 2 * present.len() >= all.len();
-        if enough { spread.coordinate(median(&mut present)) } else { f64::NAN }
+        if 2 * present.len() >= all { spread.coordinate(median(&mut present)) } else { f64::NAN }
     });
-    let present: Vec<f64> = coordinates.values().iter().copied().filter(|c| c.is_finite()).collect();
-    let between = |low: f64, high: f64| quantile(&present, low).zip(quantile(&present, high));
+    let mut present: Vec<f64> = coordinates.values().iter().copied().filter(|c| c.is_finite()).collect();
+    present.sort_unstable_by(f64::total_cmp);
+    let between = |low: f64, high: f64| of_sorted(&present, low).zip(of_sorted(&present, high));
     let ends = between(0.005, 0.995).unwrap_or((0.0, 1.0));
     let (low, high) = ends;
     let levels = if i.is_multiple_of(2) { LEVELS } else { SIGMA_LEVELS };
@@ -158,6 +160,13 @@ fn map(plane: &Grid<f32>, factor: f64, i: usize, width_px: usize) -> MapPicture 
     let placeholder = vec![[0; 3]; levels.into()];
     let png = encode(&indices, Some(&placeholder)).unwrap_or_default();
     MapPicture { png, levels, ends, range: between(0.02, 0.98) }
+}
+
+/// The value below which this share of sorted values lies, between two of them in proportion.
+fn of_sorted(values: &[f64], share: f64) -> Option<f64> {
+    let place = share * values.len().checked_sub(1)? as f64;
+    let (below, above) = (*values.get(place as usize)?, *values.get(place.ceil() as usize)?);
+    Some(below + place.fract() * (above - below))
 }
 
 impl MapPicture {
