@@ -13,8 +13,9 @@ use egomotion_io::{flo, pfm, write};
 use serde::Serialize;
 
 use crate::moving;
-use crate::report::{self, FrameRow, Report};
+use crate::report::{self, FrameRow, Report, Scene};
 use crate::session::{Outcome, Row};
+use crate::summary::{Index, SceneEntry};
 
 /// A folder that results go to.
 pub struct ResultFolder {
@@ -133,7 +134,8 @@ impl ResultFolder {
                 dt_s: row.motion.dt_s,
                 motion: row.motion.motion.as_ref().ok().copied(),
                 truth: row.truth,
-                impact: row.motion.obstacle.map(|obstacle| obstacle.impact),
+                obstacle: row.motion.obstacle,
+                moving: row.motion.moving.clone(),
                 status: status(row).to_owned(),
             })
             .collect();
@@ -143,15 +145,44 @@ impl ResultFolder {
             command: about.command.clone(),
             settings_toml: toml::to_string(about.config).context("cannot put the settings into TOML")?,
             rig: about.rig,
+            sparse: about.config.observe == Observe::Sparse,
+            complete: outcome.complete,
             frames: &frames,
             poses: outcome.trajectory.poses(),
             truth: outcome.truth.as_deref(),
-            pictures: outcome.album.pictures(),
+            album: &outcome.album,
             stages_ms: outcome.stages_ms.clone(),
             frame_ms: outcome.frame_ms,
             notes: about.notes.iter().cloned().chain(moving::note(&outcome.rows)).collect(),
         });
         self.write("report.html", page.as_bytes())
+    }
+
+    /// Write `report.html` of a set of scenes, which links to theirs.
+    pub fn write_index(&self, command: &str, index: &Index) -> Result<()> {
+        let scenes: Vec<Scene> = index.scenes.iter().map(|scene| listed(scene, &self.path)).collect();
+        let page = report::render_index(&index.source, command, index.complete, &scenes);
+        self.write("report.html", page.as_bytes())
+    }
+}
+
+/// A scene as the index of its set shows it.
+fn listed(scene: &SceneEntry, folder: &Path) -> Scene {
+    let counts: Vec<String> = scene.counts.iter().map(|(status, n)| format!("{status} {n}")).collect();
+    let verdict = scene.truth_maps.as_ref().map(|maps| {
+        format!(
+            "VZ: middle error {:.3} m a frame, {:.1} % within 2σ; disparity: {:.1} % off by more than 3 px or missing",
+            maps.vz_median_abs_error_m,
+            100.0 * maps.vz_within_2_sigma,
+            100.0 * maps.disparity_bad_3px
+        )
+    });
+    Scene {
+        name: scene.scene.clone(),
+        frames: scene.frames,
+        outcome: scene.error.clone().unwrap_or_else(|| counts.join(", ")),
+        verdict: verdict.unwrap_or_default(),
+        has_page: folder.join(&scene.scene).join("report.html").exists(),
     }
 }
 

@@ -64,6 +64,7 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
         scenes,
     };
     folder.write_json("summary.json", &index)?;
+    folder.write_index(&terminal::command_line(), &index)?;
     if args.json {
         writeln!(terminal::stdout(), "{}", serde_json::to_string_pretty(&index)?)?;
     }
@@ -171,7 +172,7 @@ fn run_sequence(
     summary.truth_maps = truth_maps;
     folder.write_json("summary.json", &summary)?;
     let about = About {
-        title: &sequence.name,
+        title: &format!("How the camera moved: {}", sequence.name),
         source: &summary.source,
         command: terminal::command_line(),
         config,

@@ -88,7 +88,7 @@ impl Session<'_> {
         let mut trajectory = Trajectory::new();
         let mut truths: Vec<Option<RigidMotion>> = Vec::new();
         let mut reference_image: Option<(usize, Image)> = None;
-        let mut album = Album::default();
+        let mut album = Album::of(self.frames);
         with_frames(self.frames, stop, fetch, |frames| -> Result<()> {
             for fetched in frames {
                 let Fetched { index, time_s, pair, truth, decode_ms } = fetched;
@@ -96,6 +96,12 @@ impl Session<'_> {
                 // Pictures show the maps over the image that they belong to.
                 let dense = self.config.observe == Observe::Dense;
                 let keep = pair.as_ref().ok().filter(|_| dense).map(|(left, _)| left.clone());
+                let writing = Instant::now();
+                if let (Ok((left, _)), false) = (&pair, dense) {
+                    let width_px = album.width_px(left.size());
+                    album.offer(|| FramePictures::of_image(index, rows.len() + 1, left, width_px));
+                }
+                tally.aside_ms += writing.elapsed().as_secs_f64() * 1e3;
                 let motion = match pair {
                     Ok((left, right)) => pipeline.push(StereoFrame { time_s, left, right }),
                     Err(why) => pipeline.skip(time_s, why),
@@ -120,9 +126,12 @@ impl Session<'_> {
                 let writing = Instant::now();
                 let earlier = reference_image.as_ref().filter(|(f, _)| Some(*f) == reference);
                 look(&row)?;
-                if let (Some(dense), Some((r, image))) = (&row.motion.dense, earlier) {
+                if let (Some(dense), Some((r, image)), Some(dt_s)) =
+                    (&row.motion.dense, earlier, row.motion.dt_s)
+                {
                     let index = rows.get(*r).map_or(*r, |row| row.index);
-                    album.offer(|| FramePictures::new(index, image, dense));
+                    let width_px = album.width_px(image.size());
+                    album.offer(|| FramePictures::new(index, rows.len(), image, dense, dt_s, width_px));
                     if self.maps {
                         out.write_maps(index, dense)?;
                     }

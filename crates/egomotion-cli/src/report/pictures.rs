@@ -1,29 +1,32 @@
-//! Small pictures of images and maps: palette indices while the run goes on, coloured PNG in the page.
+//! Small pictures of images and maps, compressed at once; the colours of the maps are put in when the page is made.
 
 use egomotion::estimate::median;
 use egomotion::geometry::{Grid, Image};
 use egomotion::metrics::quantile;
 use egomotion::motion::TimeToImpact;
 use egomotion::pipeline::stereo::DenseResults;
+use jpeg_encoder::{ColorType, Encoder};
+use rayon::prelude::*;
 
 use crate::chart::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Rgb, Spread, VIRIDIS};
-use crate::chart::raster::{encode, reduce};
+use crate::chart::raster::{encode, recolour, reduce};
 
-/// Greatest width of a picture, in pixels.
-const MOST_WIDTH_PX: usize = 480;
-
-/// Most frames of which a page shows pictures.
-pub const MOST_PICTURES: usize = 40;
+/// Quality of the JPEG pictures of the left image, of 100.
+const JPEG_QUALITY: u8 = 70;
 
 /// Palette entries that hold values; entry 0 is a missing pixel. Few, so that the page stays small.
-const LEVELS: u8 = 64;
+const LEVELS: u8 = 48;
+/// The same of a σ, which varies from pixel to pixel and is read coarsely: half the bytes.
+const SIGMA_LEVELS: u8 = 16;
 
-/// The quantities that are shown as maps, in the order of [`FramePictures`].
-pub const QUANTITIES: [Quantity; 4] = [
-    Quantity { name: "Time to impact", map: EMBER, spread: Spread::Logarithmic, metres: false, unit: "s" },
-    Quantity { name: "Disparity", map: VIRIDIS, spread: Spread::Linear, metres: false, unit: "px" },
-    Quantity { name: "Depth velocity VZ", map: DIVERGING, spread: Spread::Symmetric, metres: true, unit: "" },
-    Quantity { name: "σ of VZ", map: CIVIDIS, spread: Spread::Logarithmic, metres: true, unit: "" },
+/// The maps, each quantity followed by its σ.
+pub const QUANTITIES: [Quantity; 6] = [
+    Quantity { name: "Disparity", unit: "px", map: VIRIDIS, spread: Spread::Linear },
+    Quantity { name: "σ of disparity", unit: "px", map: CIVIDIS, spread: Spread::Logarithmic },
+    Quantity { name: "Depth velocity VZ", unit: "m/s", map: DIVERGING, spread: Spread::Symmetric },
+    Quantity { name: "σ of VZ", unit: "m/s", map: CIVIDIS, spread: Spread::Logarithmic },
+    Quantity { name: "Time to impact", unit: "s", map: EMBER, spread: Spread::Logarithmic },
+    Quantity { name: "σ of time to impact", unit: "s", map: CIVIDIS, spread: Spread::Logarithmic },
 ];
 
 /// How one quantity is shown.
@@ -31,59 +34,89 @@ pub const QUANTITIES: [Quantity; 4] = [
 pub struct Quantity {
     /// Its name.
     pub name: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
     /// Its colours.
     pub map: ColourMap,
     /// How they are spread.
     pub spread: Spread,
-    /// Whether it is a length, whose unit the page chooses.
-    pub metres: bool,
-    /// Its unit otherwise.
-    pub unit: &'static str,
 }
 
-/// The pictures of one frame, small enough to keep for all frames that are shown.
+/// The pictures of one frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FramePictures {
-    /// Earlier frame of the pair, on whose pixel grid the maps stand.
+    /// The frame shown, by its index in the source: the earlier one of the pair that the maps compare.
     pub frame: usize,
-    left: Grid<u8>,
-    maps: [MapPicture; 4],
+    /// The row of the run whose motion starts at this frame.
+    pub row: usize,
+    size: (usize, usize),
+    left_jpeg: Vec<u8>,
+    maps: Vec<MapPicture>,
 }
 
-/// A map as palette indices, evenly spread over its own range of coordinates; 0 is missing.
+/// A map as PNG of palette indices, evenly spread over its own range of coordinates; 0 is missing.
 #[derive(Debug, Clone, PartialEq)]
 struct MapPicture {
-    indices: Grid<u8>,
+    png: Vec<u8>,
+    levels: u8,
+    /// Coordinates of the first and the last level.
+    ends: (f64, f64),
+    /// Coordinates between which nearly all pixels lie; `None` without a value.
     range: Option<(f64, f64)>,
 }
 
 impl FramePictures {
-    /// The left image and the maps of a frame pair, reduced to 480 pixels in width.
-    pub fn new(frame: usize, left: &Image, dense: &DenseResults) -> Self {
-        let planes = [
-            &dense.motion.seconds(TimeToImpact::seconds),
-            dense.disparity.shift.grid(),
-            dense.motion.depth_velocity.grid(),
-            dense.motion.depth_velocity_sigma.grid(),
-        ];
-        let maps = std::array::from_fn(|i| MapPicture::new(planes[i], QUANTITIES[i].spread));
-        Self { frame, left: grey(left), maps }
+    /// The left image alone, at most `width_px` wide.
+    pub fn of_image(frame: usize, row: usize, left: &Image, width_px: usize) -> Self {
+        let grey = grey(left, width_px);
+        Self { frame, row, size: grey.size(), left_jpeg: jpeg(&grey).unwrap_or_default(), maps: Vec::new() }
+    }
+
+    /// The left image and the maps of a frame pair that lies `dt_s` apart.
+    pub fn new(
+        frame: usize,
+        row: usize,
+        left: &Image,
+        dense: &DenseResults,
+        dt_s: f64,
+        width_px: usize,
+    ) -> Self {
+        let plane = |i: usize| match i {
+            0 => map(dense.disparity.shift.grid(), 1.0, i, width_px),
+            1 => map(dense.disparity.sigma.grid(), 1.0, i, width_px),
+            2 => map(dense.motion.depth_velocity.grid(), dt_s.recip(), i, width_px),
+            3 => map(dense.motion.depth_velocity_sigma.grid(), dt_s.recip(), i, width_px),
+            4 => map(&dense.motion.seconds(TimeToImpact::seconds), 1.0, i, width_px),
+            _ => map(&dense.motion.seconds(sigma_s), 1.0, i, width_px),
+        };
+        let maps = (0..QUANTITIES.len()).into_par_iter().map(plane).collect();
+        Self { maps, ..Self::of_image(frame, row, left, width_px) }
     }
 
     /// (width, height) of the pictures, in pixels.
     pub fn size(&self) -> (usize, usize) {
-        self.left.size()
+        self.size
     }
 
-    /// The left image as PNG; `None` if it is empty.
-    pub fn left_png(&self) -> Option<Vec<u8>> {
-        encode(&self.left, None)
+    /// Bytes that are kept.
+    pub fn bytes(&self) -> usize {
+        self.left_jpeg.len() + self.maps.iter().map(|map| map.png.len()).sum::<usize>()
+    }
+
+    /// Whether there are maps, or the left image alone.
+    pub fn has_maps(&self) -> bool {
+        !self.maps.is_empty()
+    }
+
+    /// The left image as JPEG; empty where there is none.
+    pub fn left_jpeg(&self) -> &[u8] {
+        &self.left_jpeg
     }
 
     /// Quantity `i` as PNG in colours spread over `range` (coordinates); `None` if it is empty.
     pub fn map_png(&self, i: usize, range: (f64, f64)) -> Option<Vec<u8>> {
         let map = self.maps.get(i)?;
-        encode(&map.indices, Some(&map.palette(QUANTITIES[i].map, range)))
+        recolour(&map.png, &map.palette(QUANTITIES.get(i)?.map, range))
     }
 
     /// Range of the coordinates of quantity `i`: its 2nd to 98th percentile; `None` without a value.
@@ -92,93 +125,81 @@ impl FramePictures {
     }
 }
 
-impl MapPicture {
-    fn new(plane: &Grid<f32>, spread: Spread) -> Self {
-        let coordinates = reduce(plane, MOST_WIDTH_PX, |block| {
-            let mut present: Vec<f64> = block.filter(|v| v.is_finite()).map(f64::from).collect();
-            spread.coordinate(median(&mut present))
-        });
-        let present: Vec<f64> = coordinates.values().iter().copied().filter(|c| c.is_finite()).collect();
-        let range = quantile(&present, 0.02).zip(quantile(&present, 0.98));
-        let (low, high) = range.unwrap_or((0.0, 1.0));
-        let index = |c: f64| {
-            let share = if high > low { (c - low) / (high - low) } else { 0.5 };
-            1 + (share.clamp(0.0, 1.0) * f64::from(LEVELS - 1)).round() as u8
-        };
-        let (width, height) = coordinates.size();
-        let indices = Grid::from_fn(width, height, |u, v| {
-            let c = coordinates.at(u, v);
-            if c.is_finite() { index(c) } else { 0 }
-        });
-        Self { indices, range }
-    }
+/// σ of the time to impact, in seconds, to first order.
+fn sigma_s(impact: &TimeToImpact) -> Option<f64> {
+    Some(impact.seconds()?.powi(2) * impact.looming.sigma(0))
+}
 
-    /// The colour of each index from 1 on, when the colours are spread over `common`.
+/// The picture of quantity `i`, whose values are `factor` times those of `plane`.
+fn map(plane: &Grid<f32>, factor: f64, i: usize, width_px: usize) -> MapPicture {
+    let spread = QUANTITIES[i].spread;
+    let coordinates = reduce(plane, width_px, |block| {
+        let (mut all, mut present) = (0, Vec::with_capacity(16));
+        for value in block {
+            all += 1;
+            present.extend(value.is_finite().then(|| factor * f64::from(value)));
+        }
+        // A pixel of the picture is missing where most of what it stands for is.
+        if 2 * present.len() >= all { spread.coordinate(median(&mut present)) } else { f64::NAN }
+    });
+    let mut present: Vec<f64> = coordinates.values().iter().copied().filter(|c| c.is_finite()).collect();
+    present.sort_unstable_by(f64::total_cmp);
+    let between = |low: f64, high: f64| of_sorted(&present, low).zip(of_sorted(&present, high));
+    let ends = between(0.005, 0.995).unwrap_or((0.0, 1.0));
+    let (low, high) = ends;
+    let levels = if i.is_multiple_of(2) { LEVELS } else { SIGMA_LEVELS };
+    let level = |c: f64| {
+        let share = if high > low { (c - low) / (high - low) } else { 0.5 };
+        1 + (share.clamp(0.0, 1.0) * f64::from(levels - 1)).round() as u8
+    };
+    let (width, height) = coordinates.size();
+    let indices = Grid::from_fn(width, height, |u, v| {
+        let c = coordinates.at(u, v);
+        if c.is_finite() { level(c) } else { 0 }
+    });
+    let placeholder = vec![[0; 3]; levels.into()];
+    let png = encode(&indices, Some(&placeholder)).unwrap_or_default();
+    MapPicture { png, levels, ends, range: between(0.02, 0.98) }
+}
+
+/// The value below which this share of sorted values lies, between two of them in proportion.
+fn of_sorted(values: &[f64], share: f64) -> Option<f64> {
+    let place = share * values.len().checked_sub(1)? as f64;
+    let (below, above) = (*values.get(place as usize)?, *values.get(place.ceil() as usize)?);
+    Some(below + place.fract() * (above - below))
+}
+
+impl MapPicture {
+    /// The colour of each index, the missing one first, when the colours are spread over `common`.
     fn palette(&self, map: ColourMap, common: (f64, f64)) -> Vec<Rgb> {
-        let (low, high) = self.range.unwrap_or(common);
+        let (low, high) = self.ends;
         let share = |k: u8| {
-            let coordinate = low + (high - low) * f64::from(k) / f64::from(LEVELS - 1);
+            let coordinate = low + (high - low) * f64::from(k) / f64::from(self.levels - 1);
             (coordinate - common.0) / (common.1 - common.0)
         };
-        (0..LEVELS).map(|k| map.at(share(k))).collect()
+        std::iter::once([0; 3]).chain((0..self.levels).map(|k| map.at(share(k)))).collect()
     }
 }
 
-/// Grey levels from black to the brightest, 8 bit; 64 levels, so that noise costs little.
-fn grey(image: &Image) -> Grid<u8> {
-    let mean = reduce(image, MOST_WIDTH_PX, |block| {
+/// Grey levels from black to the brightest, 8 bit.
+fn grey(image: &Image, width_px: usize) -> Grid<u8> {
+    let mean = reduce(image, width_px, |block| {
         let (sum, n) = block.filter(|v| v.is_finite()).fold((0.0, 0), |(s, n), v| (s + f64::from(v), n + 1));
         sum / f64::from(n.max(1))
     });
     let brightest = quantile(mean.values(), 0.999).unwrap_or(0.0).max(1.0);
     // Eight-bit images keep their exposure, others are scaled.
     let white = if brightest <= 255.0 { 255.0 } else { brightest };
-    let level = |v: f64| 4 * ((v / white).clamp(0.0, 1.0) * 63.0).round() as u8;
+    let level = |v: f64| ((v / white).clamp(0.0, 1.0) * 255.0).round() as u8;
     Grid::from_fn(mean.width(), mean.height(), |u, v| level(mean.at(u, v)))
 }
 
-/// Pictures of at most [`MOST_PICTURES`] frames of a run whose length need not be known, evenly spaced.
-#[derive(Debug, Clone)]
-pub struct Album {
-    pictures: Vec<FramePictures>,
-    stride: usize,
-    offered: usize,
-}
-
-impl Default for Album {
-    fn default() -> Self {
-        Self { pictures: Vec::new(), stride: 1, offered: 0 }
-    }
-}
-
-impl Album {
-    /// Offer the next frame pair; its pictures are made only if they will be kept.
-    pub fn offer(&mut self, make: impl FnOnce() -> FramePictures) {
-        if self.pictures.len() == MOST_PICTURES && self.is_due() {
-            self.thin();
-        }
-        if self.is_due() {
-            self.pictures.push(make());
-        }
-        self.offered += 1;
-    }
-
-    /// The pictures kept, in order.
-    pub fn pictures(&self) -> &[FramePictures] {
-        &self.pictures
-    }
-
-    fn is_due(&self) -> bool {
-        self.offered.is_multiple_of(self.stride)
-    }
-
-    /// Keep every other one, now and from here on.
-    fn thin(&mut self) {
-        let mut keep = false;
-        self.pictures.retain(|_| {
-            keep = !keep;
-            keep
-        });
-        self.stride *= 2;
-    }
+/// `None` for an empty picture.
+fn jpeg(pixels: &Grid<u8>) -> Option<Vec<u8>> {
+    let (width, height) = (u16::try_from(pixels.width()).ok()?, u16::try_from(pixels.height()).ok()?);
+    let mut content = Vec::new();
+    let mut encoder = Encoder::new(&mut content, JPEG_QUALITY);
+    encoder.set_optimized_huffman_tables(true);
+    encoder.encode(pixels.values(), width, height, ColorType::Luma).ok()?;
+    Some(content)
 }

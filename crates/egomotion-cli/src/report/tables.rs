@@ -70,9 +70,7 @@ pub fn frames(report: &Report<'_>) -> Markup {
 }
 
 fn impact(row: &FrameRow) -> String {
-    let Some((seconds, (low, high))) = row.impact.ok().and_then(|i| i.seconds().zip(i.interval95_s())) else {
-        return "–".into();
-    };
-    let high = if high.is_finite() { significant(high, 3) } else { "∞".into() };
-    format!("{} ({} … {high})", significant(seconds, 3), significant(low, 3))
+    let Some(seconds) = row.impact() else { return "–".into() };
+    let high = if seconds.high.is_finite() { significant(seconds.high, 3) } else { "∞".into() };
+    format!("{} ({} … {high})", significant(seconds.value, 3), significant(seconds.low, 3))
 }

@@ -1,52 +1,144 @@
-//! The path of the camera from above, and how sure it is.
+//! The path of the camera from above, its height over time, and how sure both are.
 
-use egomotion::geometry::{RigidMotion, Twist};
+use egomotion::geometry::RigidMotion;
 use maud::{Markup, html};
-use nalgebra::{Matrix2, Matrix6, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector3};
 
-use super::Report;
-use crate::chart::number::length;
+use super::series::{Series, Timeline};
+use super::{Interval, Report, position};
+use crate::chart::number::{Unit, length};
 use crate::chart::plot::{Axes, MARGIN, Scale, extent, path};
 
 /// Width of the chart, in SVG units.
-const WIDTH: f64 = 380.0;
+const WIDTH: f64 = 400.0;
 /// Least and greatest height.
-const HEIGHTS: (f64, f64) = (260.0, 390.0);
+const HEIGHTS: (f64, f64) = (250.0, 400.0);
 /// About so many ellipses along the path.
 const ELLIPSES: usize = 10;
+/// Most points of a line.
+const MOST_POINTS: usize = 3000;
 /// 95 % quantile of χ² with two degrees of freedom.
 const CHI2_95: f64 = 5.991_464_547_107_979;
 
-/// The chart with a sentence on the ellipses.
-pub fn chart(report: &Report<'_>) -> Markup {
-    let truth = report.truth.map(|truth| aligned(truth, report.poses)).unwrap_or_default();
-    let axes = equal_axes(report.poses, &truth);
-    let height = axes.y.at(axes.y.range().0).unwrap_or(HEIGHTS.0) + MARGIN[3];
-    let place = |pose: &RigidMotion| axes.at(pose.translation.x, pose.translation.z);
-    let covariances = position_covariances(report);
-    let ellipses: Vec<Ellipse> = spaced(report.poses.len(), ELLIPSES)
-        .filter_map(|k| {
-            Ellipse::new(place(report.poses.get(k)?)?, &(*covariances.get(k)?)?, pixels_per_metre(&axes))
-        })
-        .filter(|ellipse| ellipse.radii.0 > 1.2)
-        .collect();
-    let ends = [report.poses.first().zip(Some("start")), report.poses.last().zip(Some("end"))];
-    html! {
-        svg viewBox=(format!("0 0 {WIDTH} {height:.1}")) role="img" aria-label="path of the camera from above" {
-            (axes.grid("X, to the right (m)", "Z, forward (m)", (5, 6)))
-            path class="true" d=(path(truth.iter().map(place))) {}
-            @for ellipse in &ellipses { (ellipse.markup()) }
-            path class="line" d=(path(report.poses.iter().map(place))) {}
-            @for (pose, name) in ends.into_iter().flatten() {
-                @if let Some((x, y)) = place(pose) {
-                    circle class=(name) cx=(format!("{x:.1}")) cy=(format!("{y:.1}")) r="4.5" {}
-                    text x=(format!("{:.1}", x + 9.0)) y=(format!("{:.1}", y + 4.0)) { (name) }
-                }
-            }
-            (camera(report, &axes))
+/// Where the camera was, and how sure that is, at every row.
+pub struct Path<'a> {
+    poses: &'a [RigidMotion],
+    truth: Vec<RigidMotion>,
+    covariances: Vec<Option<Matrix3<f64>>>,
+}
+
+impl<'a> Path<'a> {
+    /// The path of a run.
+    pub fn of(report: &Report<'a>) -> Self {
+        Self {
+            poses: report.poses,
+            truth: report.truth.map(|truth| aligned(truth, report.poses)).unwrap_or_default(),
+            covariances: position::covariances(report),
         }
-        p class="small" { (sentence(&covariances, !ellipses.is_empty())) }
     }
+
+    /// Half of the longest axis of the last position's 95 % ellipse seen from above, in metres.
+    pub fn end_within_m(&self) -> Option<f64> {
+        let [(long, _), _] = half_axes(&from_above((*self.covariances.last()?)?))?;
+        Some(long)
+    }
+
+    /// The view from above.
+    pub fn chart(&self, report: &Report<'_>) -> Markup {
+        let axes = equal_axes(self.poses, &self.truth);
+        let height = axes.y.at(axes.y.range().0).unwrap_or(HEIGHTS.0) + MARGIN[3];
+        let place = |pose: &RigidMotion| axes.at(pose.translation.x, pose.translation.z);
+        let few = self.poses.len().div_ceil(MOST_POINTS).max(1);
+        let thinned = |poses: &'_ [RigidMotion]| -> String {
+            path(poses.iter().step_by(few).chain(poses.last()).map(place))
+        };
+        let ellipse = |k: usize| {
+            let cov = from_above((*self.covariances.get(k)?)?);
+            Ellipse::new(place(self.poses.get(k)?)?, &cov, pixels_per_metre(&axes))
+        };
+        let ellipses: Vec<Ellipse> =
+            spaced(self.poses.len(), ELLIPSES).filter_map(ellipse).filter(|e| e.radii.0 > 1.2).collect();
+        let ends = [self.poses.first().zip(Some("start")), self.poses.last().zip(Some("end"))];
+        html! {
+            svg viewBox=(format!("0 0 {WIDTH} {height:.1}")) role="img" aria-label="path of the camera from above" {
+                (axes.grid("to the right (m)", "forward (m)", (5, 6)))
+                path class="true" d=(thinned(&self.truth)) {}
+                @for ellipse in &ellipses { (ellipse.markup()) }
+                path class="line" d=(thinned(self.poses)) {}
+                @for (pose, name) in ends.into_iter().flatten() {
+                    @if let Some((x, y)) = place(pose) {
+                        circle class=(name) cx=(format!("{x:.1}")) cy=(format!("{y:.1}")) r="4" {}
+                        text x=(format!("{:.1}", x + 9.0)) y=(format!("{:.1}", y + 4.0)) { (name) }
+                    }
+                }
+                (self.camera(report, &axes))
+            }
+            p class="small" { (self.sentence(!ellipses.is_empty())) }
+        }
+    }
+
+    /// Height above the start over time.
+    pub fn height(&self, report: &Report<'_>, timeline: &Timeline<'_>) -> Series {
+        let all = self.poses.iter().chain(&self.truth);
+        let unit: Unit =
+            length(all.map(|p| p.translation.y.abs()).filter(|y| y.is_finite()).fold(0.0, f64::max));
+        let step = report.frames.len().div_ceil(timeline.rows.len().max(1)).max(1);
+        let value = |k: usize| {
+            // Y points down.
+            let height = -self.poses.get(k)?.translation.y * unit.factor;
+            let sigma = self.covariances.get(k)?.map_or(f64::INFINITY, |cov| cov[(1, 1)].sqrt());
+            height.is_finite().then(|| Interval::around(height, sigma * unit.factor))
+        };
+        let truth =
+            |k: usize| Some(-self.truth.get(k)?.translation.y * unit.factor).filter(|y| y.is_finite());
+        let rows = || (0..report.frames.len()).step_by(step);
+        Series {
+            id: "height".into(),
+            name: "Height above the start".into(),
+            unit: unit.name.into(),
+            values: rows().map(value).collect(),
+            truths: rows().map(truth).collect(),
+        }
+    }
+
+    /// The camera as a triangle that follows the slider.
+    fn camera(&self, report: &Report<'_>, axes: &Axes) -> Markup {
+        let transform = |pose: &RigidMotion| {
+            let (x, y) = axes.at(pose.translation.x, pose.translation.z)?;
+            let ahead = pose.rotation * Vector3::z();
+            let angle = ahead.x.atan2(ahead.z).to_degrees();
+            angle.is_finite().then(|| format!("{x:.1} {y:.1} {angle:.1}"))
+        };
+        let at: Vec<String> = report
+            .stops()
+            .iter()
+            .map(|stop| self.poses.get(stop.row).and_then(transform))
+            .map(|at| at.unwrap_or_else(|| "-99 0 0".into()))
+            .collect();
+        html! {
+            @if !at.is_empty() { path class="camera" data-pose=(at.join(";")) d="M0 -11L7 6H-7Z" {} }
+        }
+    }
+
+    fn sentence(&self, visible: bool) -> String {
+        let Some(long) = self.end_within_m() else {
+            return "How sure the last position is cannot be said: some motion on the way is not fully known.".into();
+        };
+        let unit = length(long);
+        let drawn = match visible {
+            true => "The shaded ellipses hold the position with 95 % probability",
+            false => "The 95 % ellipses of the position are too small to be seen here",
+        };
+        format!(
+            "{drawn}. They grow, because every step adds its own uncertainty (steps are taken as independent): at the end to ±{} along the longer axis.",
+            unit.show(long * unit.factor, 2)
+        )
+    }
+}
+
+/// The part of a covariance that is seen from above, (X, Z).
+fn from_above(cov: Matrix3<f64>) -> Matrix2<f64> {
+    Matrix2::new(cov[(0, 0)], cov[(0, 2)], cov[(2, 0)], cov[(2, 2)])
 }
 
 /// A list of poses moved as a whole, so that its first is that of `to`.
@@ -81,71 +173,10 @@ fn pixels_per_metre(axes: &Axes) -> f64 {
     axes.inside()[2] / (hi - lo)
 }
 
-/// The camera as a triangle that follows the slider.
-fn camera(report: &Report<'_>, axes: &Axes) -> Markup {
-    let transform = |pose: &RigidMotion| {
-        let (x, y) = axes.at(pose.translation.x, pose.translation.z)?;
-        let ahead = pose.rotation * Vector3::z();
-        let angle = ahead.x.atan2(ahead.z).to_degrees();
-        angle.is_finite().then(|| format!("translate({x:.1} {y:.1}) rotate({angle:.1})"))
-    };
-    let row_of_pose = |row: usize| row + report.poses.len().saturating_sub(report.frames.len());
-    let at: Vec<String> = report
-        .shown_rows()
-        .into_iter()
-        .map(|row| row.and_then(|row| transform(report.poses.get(row_of_pose(row))?)))
-        .map(|at| at.unwrap_or_else(|| "translate(-99 0)".into()))
-        .collect();
-    html! {
-        @if let Some(first) = at.first() {
-            path class="camera" transform=(first) data-at=(at.join(";")) d="M0 -11L7 6H-7Z" {}
-        }
-    }
-}
-
 /// Up to about `n` indices below `len`, evenly spaced, the last among them.
 fn spaced(len: usize, n: usize) -> impl Iterator<Item = usize> {
     let step = len.div_ceil(n.max(1)).max(1);
     (0..len).rev().step_by(step)
-}
-
-/// Covariance of (X, Z) in m² at every pose, added up from those of φ; `None` from where it is unknown.
-///
-/// With T' = T exp(φ)⁻¹ and φ = φ̂ + δ the error of the pose, seen from the world, grows by −Ad(T') J δ.
-fn position_covariances(report: &Report<'_>) -> Vec<Option<Matrix2<f64>>> {
-    let mut sum = Some(Matrix6::<f64>::zeros());
-    let mut answered_s = None;
-    let first = report.poses.len().saturating_sub(report.frames.len());
-    let mut all: Vec<Option<Matrix2<f64>>> = vec![Some(Matrix2::zeros()); first.min(report.poses.len())];
-    for (row, pose) in report.frames.iter().zip(report.poses.iter().skip(first)) {
-        let last_s: &mut Option<f64> = &mut answered_s;
-        if let (Some(motion), Some(dt)) = (&row.motion, row.dt_s) {
-            // An interval that does not reach back to the last answer leaves a gap of unknown motion.
-            let whole = last_s.is_none_or(|last| row.time_s - dt <= last + 1e-6 * dt.abs().max(1e-3));
-            let known = whole && motion.theta.cov.iter().all(|v| v.is_finite());
-            let phi = Twist::from_vector(&motion.theta.mean);
-            let by_phi = adjoint(pose) * phi.left_jacobian();
-            sum = sum.filter(|_| known).map(|s| s + by_phi * motion.theta.cov * by_phi.transpose());
-        }
-        if row.motion.is_some() || !row.asks() || last_s.is_none() {
-            *last_s = Some(row.time_s);
-        }
-        all.push(sum.map(|s| {
-            let by_pose = RigidMotion::point_jacobian(&pose.translation);
-            let position = by_pose * s * by_pose.transpose();
-            Matrix2::new(position[(0, 0)], position[(0, 2)], position[(2, 0)], position[(2, 2)])
-        }));
-    }
-    all
-}
-
-/// Ad(T): a small motion (t, Ω) in the camera's frame, seen from the world.
-fn adjoint(pose: &RigidMotion) -> Matrix6<f64> {
-    let mut ad = Matrix6::zeros();
-    ad.fixed_view_mut::<3, 3>(0, 0).copy_from(&pose.rotation);
-    ad.fixed_view_mut::<3, 3>(3, 3).copy_from(&pose.rotation);
-    ad.fixed_view_mut::<3, 3>(0, 3).copy_from(&(pose.translation.cross_matrix() * pose.rotation));
-    ad
 }
 
 /// A 95 % ellipse, in SVG units and degrees.
@@ -186,86 +217,13 @@ fn half_axes(cov: &Matrix2<f64>) -> Option<[(f64, (f64, f64)); 2]> {
     Some([axis(long), axis(1 - long)])
 }
 
-fn sentence(covariances: &[Option<Matrix2<f64>>], visible: bool) -> String {
-    let Some(Some(last)) = covariances.last() else {
-        return "How sure the last position is cannot be said: some motion on the way is not fully known."
-            .into();
-    };
-    let Some([(long, _), _]) = half_axes(last) else { return String::new() };
-    let unit = length(long);
-    let drawn = if visible {
-        "Ellipses hold the position with 95 %"
-    } else {
-        "The 95 % ellipses are too small to draw"
-    };
-    format!(
-        "{drawn}; they grow because every step adds its uncertainty (taken as independent), at the end to ±{} along the longer axis.",
-        unit.show(long * unit.factor, 2)
-    )
-}
-
 #[cfg(test)]
 mod tests {
+    use egomotion::geometry::Twist;
     use nalgebra::Vector6;
 
-    use super::super::tests::{Run, motion};
+    use super::super::position::tests::poses;
     use super::*;
-
-    /// Poses from motions, as the trajectory is built.
-    fn poses(phis: &[Vector6<f64>]) -> Vec<RigidMotion> {
-        let mut all = vec![RigidMotion::identity()];
-        for phi in phis {
-            let last = all[all.len() - 1];
-            all.push(last.after(&Twist::from_vector(phi).exp().inverse()));
-        }
-        all
-    }
-
-    #[test]
-    fn covariance_of_the_position_is_that_of_differences() {
-        let mut phis: Vec<Vector6<f64>> = (0..5)
-            .map(|k| Vector6::new(0.1, -0.05, -0.4, 0.02, 0.3, -0.1) * (1.0 + 0.3 * f64::from(k)))
-            .collect();
-        let mut run = Run::of(&phis);
-        let cov = Matrix6::from_fn(|i, j| if i == j { 1e-4 * (1 + i) as f64 } else { 2e-5 });
-        for row in &mut run.rows {
-            if let Some(estimate) = &mut row.motion {
-                estimate.theta.cov = cov;
-            }
-        }
-        run.poses = poses(&phis);
-        let found = position_covariances(&run.report()).last().copied().flatten().unwrap();
-        let mut expected = Matrix2::zeros();
-        for k in 0..phis.len() {
-            let mut jacobian = nalgebra::SMatrix::<f64, 2, 6>::zeros();
-            for c in 0..6 {
-                let mut at = |step: f64| {
-                    phis[k][c] += step;
-                    let end = poses(&phis)[phis.len()].translation;
-                    phis[k][c] -= step;
-                    nalgebra::Vector2::new(end.x, end.z)
-                };
-                jacobian.set_column(c, &((at(1e-6) - at(-1e-6)) / 2e-6));
-            }
-            expected += jacobian * cov * jacobian.transpose();
-        }
-        assert!((found - expected).norm() < 1e-6 * expected.norm(), "{found} {expected}");
-    }
-
-    #[test]
-    fn a_gap_that_no_interval_bridges_ends_the_ellipses() {
-        let phis = vec![Vector6::new(0.0, 0.0, -0.1, 0.0, 0.0, 0.0); 4];
-        let mut run = Run::of(&phis);
-        run.rows[2].motion = None;
-        run.rows[2].status = "few_rows".into();
-        let known =
-            |run: &Run| position_covariances(&run.report()).iter().map(Option::is_some).collect::<Vec<_>>();
-        assert_eq!(known(&run), [true, true, true, false, false]);
-        run.rows[3].dt_s = Some(0.2);
-        assert_eq!(known(&run), [true; 5]);
-        run.rows[4].motion = Some(motion(&phis[0], f64::INFINITY));
-        assert_eq!(known(&run), [true, true, true, true, false]);
-    }
 
     #[test]
     fn truth_starts_where_the_estimate_does() {

@@ -1,0 +1,81 @@
+//! Pictures of some frames of a run whose length need not be known, in bounded memory.
+
+use super::pictures::FramePictures;
+
+/// Most frames of which a page shows pictures.
+const MOST_FRAMES: usize = 80;
+
+/// Most bytes of pictures: the page holds 4/3 of them, as text.
+const MOST_BYTES: usize = 5_600_000;
+
+/// Bytes that all pictures of a frame need for each pixel of one, about; the limit above holds whatever they are.
+const BYTES_PER_PIXEL: f64 = 1.5;
+
+/// Least and greatest width of a picture, in pixels.
+const WIDTHS_PX: (f64, f64) = (320.0, 960.0);
+
+/// Evenly spaced pictures, which thin themselves as the run goes on: every one, every second, every fourth …
+#[derive(Debug, Clone)]
+pub struct Album {
+    pictures: Vec<FramePictures>,
+    expected: usize,
+    stride: usize,
+    offered: usize,
+}
+
+impl Album {
+    /// An album of a run of about so many frames.
+    pub fn of(frames: usize) -> Self {
+        Self { pictures: Vec::new(), expected: frames, stride: 1, offered: 0 }
+    }
+
+    /// How wide to make pictures of images of `(width, height)`, so that those of all frames fit.
+    pub fn width_px(&self, (width, height): (usize, usize)) -> usize {
+        let frames = self.expected.clamp(1, MOST_FRAMES) as f64;
+        let pixels = MOST_BYTES as f64 / frames / BYTES_PER_PIXEL;
+        let fits = (pixels * width as f64 / height.max(1) as f64).sqrt();
+        width.min(fits.clamp(WIDTHS_PX.0, WIDTHS_PX.1) as usize)
+    }
+
+    /// Offer the next frame; its pictures are made only if they will be kept.
+    pub fn offer(&mut self, make: impl FnOnce() -> FramePictures) {
+        if self.pictures.len() == MOST_FRAMES && self.is_due() {
+            self.thin();
+        }
+        if self.is_due() {
+            self.pictures.push(make());
+        }
+        self.offered += 1;
+        while self.bytes() > MOST_BYTES && self.pictures.len() > 1 {
+            self.thin();
+        }
+    }
+
+    /// The pictures kept, in order.
+    pub fn pictures(&self) -> &[FramePictures] {
+        &self.pictures
+    }
+
+    /// Every so-many-th frame that was offered is kept.
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
+    fn bytes(&self) -> usize {
+        self.pictures.iter().map(FramePictures::bytes).sum()
+    }
+
+    fn is_due(&self) -> bool {
+        self.offered.is_multiple_of(self.stride)
+    }
+
+    /// Keep every other one, now and from here on.
+    fn thin(&mut self) {
+        let mut keep = false;
+        self.pictures.retain(|_| {
+            keep = !keep;
+            keep
+        });
+        self.stride *= 2;
+    }
+}
