@@ -24,9 +24,11 @@ pub mod flow_png;
 pub mod image;
 pub mod motion_table;
 pub mod pfm;
+pub mod ply;
 mod raster;
 pub mod read;
 pub mod source;
+pub mod stream;
 pub mod trajectory;
 pub mod write;
 
