@@ -19,14 +19,16 @@ const RATIONAL: Distortion = Distortion::Rational { k: [0.9, 0.2, 0.01, 1.3, 0.4
 const FISHEYE: Distortion = Distortion::Equidistant { k: [0.0034823894, 0.00071503, -0.00205, 0.0002] };
 
 fn pair(distortion: Distortion) -> RawPair {
-    let turn = |z: f64| Twist { t: Vector3::new(0.1 + z, 0.02, -0.3), omega: Vector3::new(0.1, 1.2, z) }.exp();
+    let turn =
+        |z: f64| Twist { t: Vector3::new(0.1 + z, 0.02, -0.3), omega: Vector3::new(0.1, 1.2, z) }.exp();
     let camera = |f: f64| CameraModel {
         focal_px: (f, f - 4.0 / 3.0),
         centre_px: (367.215, 248.375 + 1.0 / 7.0),
         distortion,
         size: Some(SIZE),
     };
-    let right_from_left = Twist { t: Vector3::new(-0.11, 0.001, 0.002), omega: Vector3::new(0.01, -0.02, 0.003) };
+    let right_from_left =
+        Twist { t: Vector3::new(-0.11, 0.001, 0.002), omega: Vector3::new(0.01, -0.02, 0.003) };
     RawPair {
         left: camera(458.654),
         right: camera(457.587),
@@ -36,7 +38,10 @@ fn pair(distortion: Distortion) -> RawPair {
 }
 
 fn assert_same_motion(a: &RigidMotion, b: &RigidMotion) {
-    assert!((a.rotation - b.rotation).amax() < 1e-14 && (a.translation - b.translation).amax() < 1e-14, "{a:?} {b:?}");
+    assert!(
+        (a.rotation - b.rotation).amax() < 1e-14 && (a.translation - b.translation).amax() < 1e-14,
+        "{a:?} {b:?}"
+    );
 }
 
 fn assert_same(a: &RawPair, b: &RawPair) {
@@ -106,8 +111,12 @@ fn kalibr_comes_back() {
     let text = "cam0:\n  T_cam_imu:\n  - [1.0, 0.0, 0.0, 0.05]\n  - [0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n  cam_overlaps: [1]\n  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.2, 0.0, 0.0]\n  distortion_model: radtan\n  intrinsics: [400.0, 401.0, 320.0, 240.0]\n  resolution: [640, 480]\n  rostopic: /cam0/image_raw\ncam1:\n  T_cam_imu:\n  - [1.0, 0.0, 0.0, -0.05]\n  - [0.0, 1.0, 0.0, 0.0]\n  - [0.0, 0.0, 1.0, 0.0]\n  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n  distortion_coeffs: [0.1, 0.2, 0.0, 0.0]\n  distortion_model: radtan\n  intrinsics: [400.0, 401.0, 320.0, 240.0]\n  resolution: [640, 480]\n";
     let pair = kalibr::parse(text, Path::new("c")).unwrap();
     assert!((pair.right_from_left.translation - Vector3::new(-0.1, 0.0, 0.0)).norm() < 1e-15);
-    let omni = kalibr::parse(&text.replacen("pinhole", "omni", 1), Path::new("c.yaml")).unwrap_err().to_string();
-    assert!(omni.starts_with("c.yaml:8: cam0.camera_model: \"omni\" is not supported, only pinhole; "), "{omni}");
+    let omni =
+        kalibr::parse(&text.replacen("pinhole", "omni", 1), Path::new("c.yaml")).unwrap_err().to_string();
+    assert!(
+        omni.starts_with("c.yaml:8: cam0.camera_model: \"omni\" is not supported, only pinhole; "),
+        "{omni}"
+    );
 }
 
 #[test]
@@ -130,17 +139,34 @@ fn opencv_in_the_two_files_of_its_sample() {
     };
     let camera = |f: &str| format!("{f}, 0.,\n       3.4205e+02, 0., {f}, 2.3516e+02, 0., 0., 1.");
     let lens = "-2.8e-01, 9.5e-02, 0., 0., 0., 0., 0., 2.6e-02, 0., 0., 0., 0., 0., 0.";
-    let intrinsics = ["%YAML:1.0\n---\n".to_owned(), matrix("M1", 3, 3, &camera("5.3391e+02")), matrix("D1", 1, 14, lens), matrix("M2", 3, 3, &camera("5.3391e+02")), matrix("D2", 1, 14, lens)].concat();
-    let extrinsics = ["%YAML:1.0\n---\n".to_owned(), matrix("R", 3, 3, "1., 0., 0., 0., 1., 0., 0., 0., 1."), matrix("T", 3, 1, "-3.34, 4.7e-02, -7.1e-04")].concat();
+    let intrinsics = [
+        "%YAML:1.0\n---\n".to_owned(),
+        matrix("M1", 3, 3, &camera("5.3391e+02")),
+        matrix("D1", 1, 14, lens),
+        matrix("M2", 3, 3, &camera("5.3391e+02")),
+        matrix("D2", 1, 14, lens),
+    ]
+    .concat();
+    let extrinsics = [
+        "%YAML:1.0\n---\n".to_owned(),
+        matrix("R", 3, 3, "1., 0., 0., 0., 1., 0., 0., 0., 1."),
+        matrix("T", 3, 1, "-3.34, 4.7e-02, -7.1e-04"),
+    ]
+    .concat();
     let one = folder.with("intrinsics.yml", &intrinsics);
     let other = folder.with("extrinsics.yml", &extrinsics);
     let pair = read_raw(&one);
     assert_eq!(pair, read_raw(&other));
     assert_eq!((pair.left.focal_px, pair.left.centre_px), ((533.91, 533.91), (342.05, 235.16)));
-    assert_eq!(pair.left.distortion, Distortion::Rational { k: [-0.28, 0.095, 0.0, 0.0, 0.0, 0.026], p: [0.0, 0.0] });
+    assert_eq!(
+        pair.left.distortion,
+        Distortion::Rational { k: [-0.28, 0.095, 0.0, 0.0, 0.0, 0.026], p: [0.0, 0.0] }
+    );
     assert_eq!(pair.right_from_left.translation, Vector3::new(-3.34, 0.047, -0.00071));
     fs::remove_file(&other).unwrap();
-    assert!(calibration::read(&one).unwrap_err().to_string().contains("the key R or rotation_matrix is missing"));
+    assert!(
+        calibration::read(&one).unwrap_err().to_string().contains("the key R or rotation_matrix is missing")
+    );
 }
 
 #[test]
@@ -152,7 +178,20 @@ fn ros_comes_back_and_gives_the_pose() {
         let info = |camera, rectification: &Matrix3<f64>, last: f64| ros::CameraInfo {
             camera,
             rectification: *rectification,
-            projection: [rig.focal_px, 0.0, rig.cx_px, last, 0.0, rig.focal_y_px, rig.cy_px, 0.0, 0.0, 0.0, 1.0, 0.0],
+            projection: [
+                rig.focal_px,
+                0.0,
+                rig.cx_px,
+                last,
+                0.0,
+                rig.focal_y_px,
+                rig.cy_px,
+                0.0,
+                0.0,
+                0.0,
+                1.0,
+                0.0,
+            ],
         };
         let left = info(given.left, how.rectified_left_from_left(), 0.0);
         let right = info(given.right, how.rectified_right_from_right(), -rig.depth_disparity_product());
@@ -166,7 +205,9 @@ fn ros_comes_back_and_gives_the_pose() {
             let pair = read_raw(&path);
             assert_eq!((pair.left, pair.right), (given.left, given.right));
             let (a, b) = (pair.right_from_left, given.right_from_left);
-            assert!((a.rotation - b.rotation).amax() < 1e-12 && (a.translation - b.translation).amax() < 1e-12);
+            assert!(
+                (a.rotation - b.rotation).amax() < 1e-12 && (a.translation - b.translation).amax() < 1e-12
+            );
         }
     }
 }
@@ -174,7 +215,12 @@ fn ros_comes_back_and_gives_the_pose() {
 #[test]
 fn ros_without_distortion_is_rectified() {
     let folder = Folder::new();
-    let camera = CameraModel { focal_px: (400.0, 400.0), centre_px: (320.0, 240.0), distortion: Distortion::None, size: Some((640, 480)) };
+    let camera = CameraModel {
+        focal_px: (400.0, 400.0),
+        centre_px: (320.0, 240.0),
+        distortion: Distortion::None,
+        size: Some((640, 480)),
+    };
     for (name, last) in [("left.yaml", 0.0), ("right.yaml", -40.0)] {
         let projection = [400.0, 0.0, 320.0, last, 0.0, 400.0, 240.0, 0.0, 0.0, 0.0, 1.0, 0.0];
         let info = ros::CameraInfo { camera, rectification: Matrix3::identity(), projection };
@@ -184,7 +230,12 @@ fn ros_without_distortion_is_rectified() {
     let expected = StereoRig::new(400.0, (320.0, 240.0), 0.1, (640, 480)).unwrap();
     assert_eq!(read, StereoCalibration::Rectified(expected));
     let path = folder.file("left.yaml");
-    assert!(read.pair(CameraPair::Grey, (320, 240), &path).unwrap_err().to_string().contains("is for 640x480 pixels, the images have 320x240"));
+    assert!(
+        read.pair(CameraPair::Grey, (320, 240), &path)
+            .unwrap_err()
+            .to_string()
+            .contains("is for 640x480 pixels, the images have 320x240")
+    );
     fs::remove_file(folder.file("right.yaml")).unwrap();
     assert!(calibration::read(&path).unwrap_err().to_string().contains("name them left.yaml and right.yaml"));
 }
@@ -198,13 +249,21 @@ fn our_own_comes_back() {
         rig::write(&file, &StereoCalibration::Raw(given)).unwrap();
         assert_same(&given, &read_raw(&file));
     }
-    let given = StereoRig { doffs_px: 1.0 / 3.0, focal_y_px: 401.5, ..StereoRig::new(400.0, (320.0, 240.0), 0.1, (640, 480)).unwrap() };
+    let given = StereoRig {
+        doffs_px: 1.0 / 3.0,
+        focal_y_px: 401.5,
+        ..StereoRig::new(400.0, (320.0, 240.0), 0.1, (640, 480)).unwrap()
+    };
     rig::write(&file, &StereoCalibration::Rectified(given)).unwrap();
     assert_eq!(calibration::read(&file).unwrap(), StereoCalibration::Rectified(given));
     // The least that it can say, for images of any size.
-    let short = folder.with("rig.toml", "# ours\nfocal_px = 400\ncx_px = 320\ncy_px = 240\nbaseline_m = 0.1\n");
+    let short =
+        folder.with("rig.toml", "# ours\nfocal_px = 400\ncx_px = 320\ncy_px = 240\nbaseline_m = 0.1\n");
     let read = calibration::read(&short).unwrap().pair(CameraPair::Grey, (640, 480), &short).unwrap();
-    assert_eq!((read.rig, read.rectification), (StereoRig::new(400.0, (320.0, 240.0), 0.1, (640, 480)).unwrap(), None));
+    assert_eq!(
+        (read.rig, read.rectification),
+        (StereoRig::new(400.0, (320.0, 240.0), 0.1, (640, 480)).unwrap(), None)
+    );
 }
 
 #[test]
@@ -227,18 +286,34 @@ fn what_is_wrong_is_named() {
         read.map(drop).unwrap_err().to_string()
     };
     for (from, to, expected) in [
-        ("0.01, 0, 0]", "0.01, 0]", "rig.toml:5: left.distortion: 3 distortion coefficients; give k1 k2 p1 p2"),
+        (
+            "0.01, 0, 0]",
+            "0.01, 0]",
+            "rig.toml:5: left.distortion: 3 distortion coefficients; give k1 k2 p1 p2",
+        ),
         ("-0.1, 0, 1", "-0.1, 0, 2", "rig.toml:1: right_from_left: is no rotation"),
         (", 1]\n[left]", "]\n[left]", "rig.toml:1: right_from_left: 15 numbers, not 16"),
         ("[right]", "[wrong]", "the key right is missing"),
-        ("focal_px = [400, 400]", "focal_px = [0, 400]", "the left camera: focal length 0 px is not positive"),
+        (
+            "focal_px = [400, 400]",
+            "focal_px = [0, 400]",
+            "the left camera: focal length 0 px is not positive",
+        ),
         ("focal_px = [400, 400]", "focal_px = 400", "rig.toml:3: left.focal_px: 1 numbers, not 2"),
         ("[320, 240]", "[320, nan]", "rig.toml:4: left.centre_px: NaN is not a finite number"),
         ("-0.1, 0, 1", "0.1, 0, 1", "left and right may be swapped"),
         ("-0.1, 0, 1", "-110, 0, 1", "110 m apart; is that in millimetres?"),
-        ("[-0.1, 0.01", "[1e300, 1e300", "rig.toml: "),
-        ("distortion = [", "size_px = [1920, 1080]\ndistortion = [", "is calibrated for 1920x1080 pixels, the images have 640x480"),
-        ("distortion = [", "distortion_model = \"tilted\"\ndistortion = [", "rig.toml:5: left.distortion_model: the distortion model \"tilted\" is not known"),
+        ("[-0.1, 0.01", "[1e300, inf", "rig.toml:5: left.distortion: inf is not a finite number"),
+        (
+            "distortion = [",
+            "size_px = [1920, 1080]\ndistortion = [",
+            "is calibrated for 1920x1080 pixels, the images have 640x480",
+        ),
+        (
+            "distortion = [",
+            "distortion_model = \"tilted\"\ndistortion = [",
+            "rig.toml:5: left.distortion_model: the distortion model \"tilted\" is not known",
+        ),
         ("[left]", "[left", "rig.toml:2: is no TOML"),
     ] {
         let message = refused(from, to);

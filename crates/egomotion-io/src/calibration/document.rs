@@ -351,13 +351,14 @@ mod tests {
     #[test]
     fn errors_name_line_and_key() {
         let path = Path::new("c.yaml");
-        let document = Document::yaml("cam0:\n  f: [1, x]\n  g: .nan\n", path).unwrap();
+        let document = Document::yaml("cam0:\n  f: [1, x]\n  g: nan\n", path).unwrap();
         let cam = document.root(path).get(&["cam0"]).unwrap();
         let message = |entry: &str| cam.get(&[entry]).unwrap().all_numbers().unwrap_err().to_string();
         assert!(message("f").starts_with("c.yaml:2: cam0.f: \"x\" is not a number"), "{}", message("f"));
         assert!(message("g").starts_with("c.yaml:3: cam0.g: "), "{}", message("g"));
         assert!(cam.get(&["h", "i"]).unwrap_err().to_string().contains("the key h or i in cam0 is missing"));
         assert!(Document::yaml("a: [1, 2\nb: 3", path).is_err());
+        assert!(Document::yaml("a: 1\nb: .nan", path).is_err());
         assert!(
             Document::toml("a = 1\nb = = 2", path)
                 .unwrap_err()

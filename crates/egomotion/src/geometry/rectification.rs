@@ -93,7 +93,15 @@ impl StereoRectification {
         let (turn_left, turn_right) = (level * half, level * half.transpose());
         let view = View::seen(&left, &turn_left).and_then(|a| a.and(&View::seen(&right, &turn_right)?));
         let view = view.ok_or(RectificationError::View)?;
-        let (focal_px, (cx_px, cy_px)) = view.shown([&left, &right], size);
+        let middle = |camera: &Camera, turn: &Matrix3<f64>| {
+            let (width, height) = camera.size();
+            let centre = Vector2::new(0.5 * (width - 1) as f64, 0.5 * (height - 1) as f64);
+            let ray = turn * camera.direction(&centre)?;
+            (ray.z > 0.0).then(|| ray.xy() / ray.z)
+        };
+        let middles = middle(&left, &turn_left).zip(middle(&right, &turn_right));
+        let (a, b) = middles.ok_or(RectificationError::View)?;
+        let (focal_px, (cx_px, cy_px)) = view.shown([&left, &right], 0.5 * (a + b), size);
         let rig = StereoRig::new(focal_px, (cx_px, cy_px), baseline_m, size)?;
         Ok(Self { left, right, right_from_left, turn_left, turn_right, rig })
     }
@@ -175,16 +183,24 @@ impl View {
         (x[0] < x[1] && y[0] < y[1]).then_some(Self { x, y })
     }
 
-    /// Focal length and principal point that show its middle in an image of `size`.
-    fn shown(&self, cameras: [&Camera; 2], (width, height): (usize, usize)) -> (f64, (f64, f64)) {
+    /// Focal length and principal point that show it in an image of `size`, as near to `middle` as it reaches.
+    fn shown(
+        &self,
+        cameras: [&Camera; 2],
+        middle: Vector2<f64>,
+        (width, height): (usize, usize),
+    ) -> (f64, (f64, f64)) {
         let span = |[low, high]: [f64; 2], pixels: usize| (pixels.max(1) - 1) as f64 / (high - low);
         let fills = span(self.x, width).max(span(self.y, height));
         let own = cameras.iter().flat_map(|c| [c.focal_px().0, c.focal_px().1]).product::<f64>().powf(0.25);
         let focal = fills.max(LEAST_RESOLUTION * own);
-        let centre = |[low, high]: [f64; 2], pixels: usize| {
-            0.5 * (pixels.max(1) - 1) as f64 - 0.5 * focal * (low + high)
+        // The middle of the raw images in the middle, as far as the view reaches.
+        let principal = |[low, high]: [f64; 2], middle: f64, pixels: usize| {
+            let half = 0.5 * (pixels.max(1) - 1) as f64;
+            let (first, last) = (low + half / focal, high - half / focal);
+            half - focal * if first < last { middle.clamp(first, last) } else { 0.5 * (low + high) }
         };
-        (focal, (centre(self.x, width), centre(self.y, height)))
+        (focal, (principal(self.x, middle.x, width), principal(self.y, middle.y, height)))
     }
 }
 
