@@ -38,14 +38,17 @@ pub(super) struct Entry<'a> {
     node: &'a Node,
 }
 
-/// Elements of an XML file may be nested so deep.
+/// Lists, maps and elements may be nested so deep.
 const DEEPEST: usize = 32;
 
 impl Document {
     /// A YAML text. OpenCV's head `%YAML:1.0`, which no YAML parser takes, is skipped.
     pub(super) fn yaml(text: &str, path: &Path) -> Result<Self, IoError> {
         let bare = text.strip_prefix("%YAML:").map(|rest| format!("# {rest}"));
-        let options = serde_saphyr::options! { with_snippet: false };
+        let options = serde_saphyr::options! {
+            with_snippet: false,
+            budget: serde_saphyr::budget! { max_depth: DEEPEST },
+        };
         let tree =
             serde_saphyr::from_str_with_options::<Spanned<Value>>(bare.as_deref().unwrap_or(text), options);
         let tree = tree.map_err(|error| {
@@ -366,5 +369,10 @@ mod tests {
                 .starts_with("c.yaml:2: is no TOML")
         );
         assert!(Document::xml("<a><b>1</b>", path).is_err());
+        for deep in ["[".repeat(100_000), "- ".repeat(100_000), "{a: ".repeat(50_000)] {
+            assert!(Document::yaml(&deep, path).is_err());
+        }
+        assert!(Document::xml(&"<a>".repeat(100_000), path).is_err());
+        assert!(Document::toml(&format!("a = {}", "[".repeat(100_000)), path).is_err());
     }
 }

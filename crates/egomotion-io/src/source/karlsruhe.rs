@@ -26,8 +26,9 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
 
 /// The pose of each row: columns 5 to 7 are x, y, z in metres, 10 the yaw in radians from x towards y.
 ///
-/// Roll and pitch are taken as zero: the car's camera looks along its yaw. Where the camera sits on the car
-/// is not told; the place is that of the GPS.
+/// How the camera sits on the car is not told, so it is taken to look along the yaw, level, from the place of
+/// the GPS. The camera of these sequences really looks some degrees up or down, and the car pitches and rolls:
+/// only yaw and place can be judged by these poses.
 fn read_poses(file: &Path) -> Result<Vec<RigidMotion>, IoError> {
     let text = read::text(file)?;
     let pose = |(line, content): (usize, &str)| {
