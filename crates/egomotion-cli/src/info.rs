@@ -61,7 +61,9 @@ fn print_cameras(out: &mut impl std::io::Write, pair: &StereoRectification) -> R
         writeln!(out, "  {side}{}", described(camera))?;
     }
     let pose = pair.right_from_left();
-    let (place, turn) = (pose.inverse().translation, pose.log().omega.norm().to_degrees());
+    // Rounded first, so that no zero has a sign.
+    let place = pose.inverse().translation.map(|c| (1e4 * c).round() / 1e4 + 0.0);
+    let turn = pose.log().omega.norm().to_degrees();
     writeln!(
         out,
         "  pose      right camera at ({:.4}, {:.4}, {:.4}) m from the left one, turned by {turn:.2}°",
