@@ -65,7 +65,7 @@ pub fn write(path: &Path, pair: &RawPair) -> Result<(), IoError> {
         let model = match camera.distortion {
             Distortion::Equidistant { .. } => "equidistant",
             Distortion::None => "none",
-            Distortion::RadialTangential { k: [_, _, k3], .. } if k3 == 0.0 => "radtan",
+            Distortion::RadialTangential { k: [_, _, 0.0], .. } => "radtan",
             _ => {
                 let reason = "Kalibr's format has no k3 and no rational distortion";
                 return Err(IoError::new(path, reason, "write OpenCV's format"));

@@ -21,6 +21,8 @@ use crate::{IoError, read};
 use document::Document;
 
 /// What a calibration file says.
+// There is one a source: its size does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone, PartialEq)]
 pub enum StereoCalibration {
     /// KITTI's projections of rectified images, of a grey pair, a colour pair or both.
