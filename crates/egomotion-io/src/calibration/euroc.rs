@@ -27,7 +27,7 @@ pub fn parse(text: &str, path: &Path) -> Result<(CameraModel, RigidMotion), IoEr
 /// The pair of two `sensor.yaml`, the left camera's first.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`read()`].
 pub fn read_pair(left: &Path, right: &Path) -> Result<RawPair, IoError> {
     let ((left, body_from_left), (right, body_from_right)) = (read(left)?, read(right)?);
     let right_from_left = body_from_right.inverse().after(&body_from_left);
@@ -50,7 +50,7 @@ pub(super) fn camera(root: &Entry<'_>) -> Result<(CameraModel, RigidMotion), IoE
     Ok((model, root.get(&["T_BS"])?.motion()?))
 }
 
-/// Write one camera and its pose, such that [`read`] gives them back.
+/// Write one camera and its pose, such that [`read()`] gives them back.
 ///
 /// # Errors
 /// The file cannot be written, or the format has no name for the distortion.

@@ -1,4 +1,4 @@
-//! Calibration files of stereo pairs, one module a format; [`read`] recognises which.
+//! Calibration files of stereo pairs, one module a format; [`read()`] recognises which.
 
 pub mod camera;
 mod document;
@@ -78,7 +78,7 @@ pub fn read(path: &Path) -> Result<StereoCalibration, IoError> {
 /// one for each.
 ///
 /// # Errors
-/// As [`read`].
+/// As [`read()`].
 pub fn parse(text: &str, path: &Path) -> Result<StereoCalibration, IoError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (format, document) = recognise(text, path)?;

@@ -150,7 +150,7 @@ fn model(path: &Path, pair: &RawPair) -> Result<&'static str, IoError> {
     both.ok_or_else(|| IoError::new(path, "one camera is a fisheye, the other not", "write Kalibr's format"))
 }
 
-/// Write a pair as YAML with OpenCV's head, such that [`read`] gives it back.
+/// Write a pair as YAML with OpenCV's head, such that [`read()`] gives it back.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -168,7 +168,7 @@ pub fn write_yaml(path: &Path, pair: &RawPair) -> Result<(), IoError> {
     write::bytes(path, text.as_bytes())
 }
 
-/// Write a pair as XML, such that [`read`] gives it back.
+/// Write a pair as XML, such that [`read()`] gives it back.
 ///
 /// # Errors
 /// The file cannot be written.

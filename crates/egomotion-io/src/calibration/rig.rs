@@ -94,7 +94,7 @@ fn camera(entry: &Entry<'_>) -> Result<CameraModel, IoError> {
     Ok(CameraModel { focal_px: (fx, fy), centre_px: (cx, cy), distortion: lens, size })
 }
 
-/// Write a calibration, such that [`read`] gives it back.
+/// Write a calibration, such that [`read()`] gives it back.
 ///
 /// # Errors
 /// The file cannot be written, or is KITTI's, which is not one pair.

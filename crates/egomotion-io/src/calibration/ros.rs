@@ -83,7 +83,7 @@ pub(super) fn partners(path: &Path) -> Result<(PathBuf, PathBuf), IoError> {
 /// are those of the projections.
 ///
 /// # Errors
-/// As [`read`]; and what of the two does not fit together.
+/// As [`read()`]; and what of the two does not fit together.
 pub fn read_pair(left: &Path, right: &Path) -> Result<StereoCalibration, IoError> {
     let (l, r) = (read(left)?, read(right)?);
     let p = &r.projection;
@@ -128,7 +128,7 @@ pub fn read_pair(left: &Path, right: &Path) -> Result<StereoCalibration, IoError
     }))
 }
 
-/// Write one camera, such that [`read`] gives it back.
+/// Write one camera, such that [`read()`] gives it back.
 ///
 /// # Errors
 /// The file cannot be written, or the camera has no size.
