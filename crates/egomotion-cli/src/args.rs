@@ -24,8 +24,9 @@ pub enum Command {
     Demo(DemoArgs),
     /// Estimate the motion of a real stereo sequence.
     ///
-    /// SOURCE is a folder in KITTI odometry layout (image_0, image_1, calib.txt, times.txt) or the
-    /// training folder of KITTI 2012 or 2015, whose scenes are run one by one.
+    /// SOURCE is a folder in KITTI odometry layout (image_0, image_1, calib.txt, times.txt), a recording of EuRoC
+    /// or TUM-VI (mav0/cam0, mav0/cam1: raw images, which are rectified), or the training folder of KITTI 2012
+    /// or 2015, whose scenes are run one by one.
     Run(Box<RunArgs>),
     /// Render a sequence in KITTI layout, with its exact truth beside it.
     ///
@@ -98,7 +99,8 @@ pub struct RunArgs {
     /// Every pixel with all maps, or tracked corners alone at the highest rate [default: dense].
     #[arg(long, value_enum)]
     pub observe: Option<ObserveArg>,
-    /// Calibration to use in place of the source's own (KITTI calib.txt).
+    /// Calibration to use in place of the source's own: KITTI, EuRoC sensor.yaml, Kalibr camchain, OpenCV
+    /// YAML or XML, ROS CameraInfo, or rig.toml; raw cameras are rectified.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
     /// Grey PNG of the image's size; pixels that are not black in it are never used.
@@ -297,6 +299,9 @@ fn delta(text: &str) -> Result<(String, Delta), String> {
 pub struct InfoArgs {
     /// Folder of the sequence or set.
     pub source: PathBuf,
+    /// Calibration to use in place of the source's own, as for run.
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
 }
 
 /// A whole number of at least 1.

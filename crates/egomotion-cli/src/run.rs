@@ -140,7 +140,9 @@ fn run_sequence(
     let rig = sequence.rig.ok_or_else(|| {
         anyhow!("{}: no calibration; give one with --calibration FILE", args.source.display())
     })?;
+    let reader = feed::Reader::new(sequence);
     let mask = args.mask.as_deref().map(|path| read_mask(path, &rig)).transpose()?;
+    let mask = joined(mask, reader.unseen());
     let folder = ResultFolder::create(out, args.maps)?;
     let bar = progress(frames.len(), args.quiet);
     bar.set_message(sequence.name.clone());
@@ -150,7 +152,7 @@ fn run_sequence(
     let outcome = session.run(
         stop,
         &folder,
-        |k| feed::read(frames[k].0, frames[k].1),
+        |k| reader.read(frames[k].0, frames[k].1),
         |row| {
             if let Err(why) = &row.motion.motion
                 && *why != Unanswered::First
@@ -170,6 +172,9 @@ fn run_sequence(
     folder.write_motion(config, &outcome)?;
     let mut summary = Summary::new(args.source.display().to_string(), rig, config, &outcome);
     summary.truth_maps = truth_maps;
+    for warning in &summary.warnings {
+        terminal::tell(format_args!("{}: warning: {warning}", sequence.name));
+    }
     folder.write_json("summary.json", &summary)?;
     let about = About {
         title: &format!("How the camera moved: {}", sequence.name),
@@ -192,17 +197,9 @@ fn notes(summary: &Summary) -> Vec<String> {
                 .into(),
         );
     }
-    if let Some(rows) = summary.row_disagreement_px.filter(|&rows| rows > WORRYING_ROWS_PX) {
-        notes.push(format!(
-            "Matches of left and right lie on different rows, by {rows:.2} px: the pair is not well rectified, \
-             and depths are less certain than their noise tells."
-        ));
-    }
+    notes.extend(summary.warnings.iter().cloned());
     notes
 }
-
-/// Rows that disagree by more than this show in every depth.
-const WORRYING_ROWS_PX: f64 = 0.25;
 
 /// The frames to use with their times, which increase also when playing backwards.
 fn select<'a>(args: &RunArgs, sequence: &'a Sequence) -> Result<Vec<(&'a FrameFiles, f64)>> {
@@ -237,6 +234,13 @@ fn read_mask(path: &Path, rig: &StereoRig) -> Result<Grid<bool>> {
         );
     }
     Ok(Grid::from_fn(w, h, |u, v| mask.at(u, v) > 0.0))
+}
+
+/// Pixels that either mask excludes.
+fn joined(mask: Option<Grid<bool>>, unseen: Option<&Grid<bool>>) -> Option<Grid<bool>> {
+    let (Some(mut mask), Some(unseen)) = (mask.clone(), unseen) else { return mask.or(unseen.cloned()) };
+    mask.values_mut().iter_mut().zip(unseen.values()).for_each(|(masked, unseen)| *masked |= unseen);
+    Some(mask)
 }
 
 /// Whether any row gives a motion, or part of one.

@@ -32,6 +32,9 @@ pub struct Summary {
     /// Median over the frames of the vertical disparity of matches, in pixels: 0 if perfectly rectified.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_disagreement_px: Option<f64>,
+    /// What makes the answers less certain than they say.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
     /// Against the source's own truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<MotionVerdict>,
@@ -49,6 +52,8 @@ impl Summary {
                 *no_obstacle.entry(why.code()).or_insert(0) += 1;
             }
         }
+        let rows: Vec<f64> = outcome.rows.iter().filter_map(|row| row.motion.row_disagreement_px).collect();
+        let row_disagreement_px = egomotion::metrics::quantile(&rows, 0.5);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             source,
@@ -62,14 +67,25 @@ impl Summary {
             stages_ms: outcome.stages_ms.iter().copied().collect(),
             frame_ms: outcome.frame_ms,
             wall_s: outcome.wall_s,
-            row_disagreement_px: egomotion::metrics::quantile(
-                &outcome.rows.iter().filter_map(|row| row.motion.row_disagreement_px).collect::<Vec<_>>(),
-                0.5,
-            ),
+            row_disagreement_px,
+            warnings: row_disagreement_px.and_then(badly_rectified).into_iter().collect(),
             truth: MotionVerdict::of(outcome),
             truth_maps: None,
         }
     }
+}
+
+/// Rows that disagree by more than this show in every depth.
+const WORRYING_ROWS_PX: f64 = 0.25;
+
+/// What to say of a pair whose rows disagree.
+fn badly_rectified(rows_px: f64) -> Option<String> {
+    (rows_px > WORRYING_ROWS_PX).then(|| {
+        format!(
+            "Matches of left and right lie on different rows, by {rows_px:.2} px: the pair is not well rectified, \
+             and depths are less certain than their noise tells. Check the calibration."
+        )
+    })
 }
 
 /// An index over the scenes of a set.

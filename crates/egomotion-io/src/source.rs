@@ -1,14 +1,17 @@
 //! What a SOURCE folder holds: its layout, frames, time stamps, rig and truth.
 
+mod euroc;
+mod karlsruhe;
 mod kitti_odometry;
 mod kitti_raw;
 mod kitti_scenes;
 mod listing;
+mod stamped_poses;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use egomotion::geometry::{RigidMotion, StereoRig};
+use egomotion::geometry::{RigidMotion, StereoRectification, StereoRig};
 
 use crate::IoError;
 
@@ -38,6 +41,12 @@ pub enum Layout {
     KittiStereoFlow2012,
     /// The scene flow set of 2015: colour scenes `image_2`, `image_3`, `calib_cam/`.
     KittiSceneFlow2015,
+    /// `mav0/cam0`, `mav0/cam1`: raw images with time stamps in nanoseconds.
+    Euroc,
+    /// The same of TUM-VI's fisheye cameras.
+    TumVi,
+    /// `image_0`, `image_1`, `calib.txt` and `insdata.txt`.
+    Karlsruhe,
 }
 
 /// Consecutive stereo pairs of one rig.
@@ -52,6 +61,8 @@ pub struct Sequence {
     pub clock: Clock,
     /// The rectified rig; `None` where the layout has no calibration.
     pub rig: Option<StereoRig>,
+    /// How the images are rectified to that rig; `None` where they are.
+    pub rectification: Option<StereoRectification>,
     /// True maps, where the layout has them.
     pub truth_maps: Option<TruthMaps>,
 }
@@ -100,7 +111,8 @@ pub struct TruthMaps {
 
 /// The layouts for error messages.
 const KNOWN: &str = "known layouts: KITTI odometry (image_0, image_1 or image_2, image_3, and calib.txt), \
-                     KITTI 2012 and 2015 scenes (training/ with image_0, image_1 or image_2, image_3)";
+                     KITTI 2012 and 2015 scenes (training/ with image_0, image_1 or image_2, image_3), \
+                     EuRoC and TUM-VI (mav0/cam0, mav0/cam1)";
 
 /// Interval of the KITTI cameras, assumed where there are no time stamps, in seconds.
 const KITTI_INTERVAL_S: f64 = 0.1;
@@ -129,6 +141,14 @@ impl Source {
             ));
         }
         let recognised = kitti_scenes::recognise(&folder, calibration)?;
+        let recognised = match recognised {
+            Some(found) => Some(found),
+            None => euroc::recognise(&folder, calibration)?,
+        };
+        let recognised = match recognised {
+            Some(found) => Some(found),
+            None => karlsruhe::recognise(&folder, calibration)?,
+        };
         let recognised = match recognised {
             Some(found) => Some(found),
             None => kitti_odometry::recognise(&folder, calibration)?,
@@ -165,6 +185,9 @@ impl fmt::Display for Layout {
             Self::KittiRaw => "KITTI raw",
             Self::KittiStereoFlow2012 => "KITTI stereo and flow 2012",
             Self::KittiSceneFlow2015 => "KITTI scene flow 2015",
+            Self::Euroc => "EuRoC",
+            Self::TumVi => "TUM-VI",
+            Self::Karlsruhe => "Karlsruhe",
         })
     }
 }

@@ -4,10 +4,13 @@
 use std::fs;
 use std::path::Path;
 
-use egomotion::geometry::{Field, Grid, RigidMotion};
-use egomotion_io::calibration::{Calibration, CameraPair};
+use egomotion::geometry::{Distortion, Field, Grid, RigidMotion};
+use egomotion_io::calibration::{
+    self, Calibration, CameraModel, CameraPair, RawPair, StereoCalibration, euroc, kalibr, opencv, rig, ros,
+};
 use egomotion_io::trajectory::{self, Pose};
 use egomotion_io::{IoError, disparity_png, flo, flow_png, image, pfm};
+use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -24,6 +27,11 @@ fn kinds() -> Vec<(&'static str, Vec<u8>, Reader, bool)> {
     };
     let field = || Field::from_grid(Grid::from_fn(23, 17, |u, v| ((u * v) % 7) as f32 + 0.25 * u as f32));
     let poses = [Pose { time_s: Some(1.25), world_from_camera: RigidMotion::identity() }; 5];
+    let pair = raw_pair();
+    let whole: Reader = |c, p| {
+        let calibration = calibration::parse(&String::from_utf8_lossy(c), p)?;
+        calibration.pair(CameraPair::Grey, (8, 6), p).map(|pair| assert!(pair.rig.check().is_ok()))
+    };
     let calibration = b"P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP1: 700 0 600 -350 0 700 180 0 0 0 1 0\n";
     vec![
         (
@@ -84,7 +92,37 @@ fn kinds() -> Vec<(&'static str, Vec<u8>, Reader, bool)> {
             },
             false,
         ),
+        ("kalibr.txt", written(&|p| kalibr::write(p, &pair).unwrap()), whole, false),
+        ("opencv_yaml.txt", written(&|p| opencv::write_yaml(p, &pair).unwrap()), whole, false),
+        ("opencv_xml.txt", written(&|p| opencv::write_xml(p, &pair).unwrap()), whole, false),
+        ("rig.txt", written(&|p| rig::write(p, &StereoCalibration::Raw(pair)).unwrap()), whole, false),
+        (
+            "euroc.txt",
+            written(&|p| euroc::write(p, &pair.left, &pair.right_from_left).unwrap()),
+            |c, p| euroc::parse(&String::from_utf8_lossy(c), p).map(drop),
+            false,
+        ),
+        (
+            "ros.txt",
+            written(&|p| {
+                let camera = CameraModel { size: Some((8, 6)), ..pair.left };
+                let info =
+                    ros::CameraInfo { camera, rectification: Matrix3::identity(), projection: [0.5; 12] };
+                ros::write(p, &info).unwrap();
+            }),
+            |c, p| ros::parse(&String::from_utf8_lossy(c), p).map(drop),
+            false,
+        ),
     ]
+}
+
+/// Two cameras for images of any size.
+fn raw_pair() -> RawPair {
+    let distortion = Distortion::RadialTangential { k: [-0.28, 0.07, 0.0], p: [1e-4, 2e-5] };
+    let camera = CameraModel { focal_px: (40.0, 41.0), centre_px: (3.5, 2.5), distortion, size: None };
+    let right_from_left =
+        RigidMotion { rotation: Matrix3::identity(), translation: Vector3::new(-0.1, 0.0, 0.0) };
+    RawPair { left: camera, right: camera, right_from_left, body_from_left: None }
 }
 
 /// Run a reader; an error must be one line that starts with the file's name.

@@ -51,14 +51,18 @@ fn kitti_odometry_06() -> Result<(), IoError> {
 }
 
 #[test]
-fn karlsruhe_and_euroc_in_the_same_layout() -> Result<(), IoError> {
+fn karlsruhe_and_rectified_euroc_in_kittis_folders() -> Result<(), IoError> {
     if let Some(folder) = data("karlsruhe_0019") {
         let source = Source::open(&folder)?;
         let sequence = &source.sequences[0];
-        assert_eq!((source.layout, sequence.frames.len()), (Layout::KittiOdometry, 45));
+        assert_eq!((source.layout, sequence.frames.len()), (Layout::Karlsruhe, 45));
         near(sequence.rig.unwrap().focal_px, 645.24, 0.005);
         near(sequence.rig.unwrap().baseline_m, 0.5707, 5e-5);
-        assert!(sequence.frames.iter().all(|f| f.truth.is_none()));
+        // It drives forwards: along Z of the camera, about a metre a frame, hardly sideways.
+        let truth: Vec<RigidMotion> = sequence.frames.iter().filter_map(|f| f.truth).collect();
+        assert_eq!(truth.len(), 45);
+        let whole = truth[0].inverse().after(&truth[44]).translation;
+        assert!(whole.z > 20.0 && whole.x.abs() < 0.2 * whole.z && whole.y.abs() < 1.0, "{whole}");
     }
     if let Some(folder) = data("euroc_v101_static") {
         let source = Source::open(&folder)?;
@@ -68,6 +72,29 @@ fn karlsruhe_and_euroc_in_the_same_layout() -> Result<(), IoError> {
         near(sequence.rig.unwrap().baseline_m, 0.1101, 5e-5);
         assert!(sequence.frames.iter().all(|f| f.truth.is_some()));
     }
+    Ok(())
+}
+
+/// Raw images: the calibration of `sensor.yaml`, and the truth of the camera as it is rectified.
+#[test]
+fn euroc_mh01_raw() -> Result<(), IoError> {
+    let Some(folder) = data("euroc_mh01") else { return Ok(()) };
+    let source = Source::open(&folder)?;
+    assert_eq!(Source::open(&folder.join("mav0"))?.sequences, source.sequences);
+    let sequence = &source.sequences[0];
+    assert_eq!((source.layout, sequence.frames.len(), sequence.clock), (Layout::Euroc, 60, Clock::Measured));
+    let pair = sequence.rectification.as_ref().unwrap();
+    assert_eq!(pair.left().focal_px(), (458.654, 457.296));
+    let rig = sequence.rig.unwrap();
+    assert_eq!((*pair.rig(), rig.doffs_px, rig.width_px, rig.height_px), (rig, 0.0, 752, 480));
+    // OpenCV's stereoRectify says 436.2 px with alpha 0, and this baseline.
+    near(rig.focal_px, 436.2, 10.0);
+    near(rig.baseline_m, 0.110_077_842, 1e-8);
+    assert!(sequence.frames.iter().all(|f| f.right.is_some()));
+    near(sequence.frames[1].time_s - sequence.frames[0].time_s, 0.05, 1e-6);
+    let truth = sequence.frames[0].truth.unwrap();
+    // The first row of the truth, turned by the rectification about the same place.
+    near(truth.translation.x, 4.7308101897, 1e-12);
     Ok(())
 }
 

@@ -155,7 +155,7 @@ pub struct RealArgs {
     /// φ is estimated from every N-th pixel in both directions [default: 2 rendered, 4 of a recording].
     #[arg(long, value_name = "N", value_parser = positive)]
     pub sample: Option<usize>,
-    /// Calibration of the recording to use in place of its own (KITTI calib.txt).
+    /// Calibration of the recording to use in place of its own (any format that run takes).
     #[arg(long, value_name = "FILE", requires = "source")]
     pub calibration: Option<PathBuf>,
     /// First frame of the recording, counted from 0.

@@ -4,16 +4,17 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 use egomotion::geometry::{RigidMotion, StereoRig, Twist};
+use egomotion::pipeline::Unanswered;
 use egomotion::sim::StereoImages;
 use egomotion::study::real::recording::{Measuring, Triple, publish};
 use egomotion::study::real::{Draw, LabStudy, RealError, Record};
 use egomotion::study::{Publication, Study};
 use egomotion_io::source::{FrameFiles, Source};
-use egomotion_io::{IoError, image};
 use serde::Serialize;
 
 use super::alone;
 use super::args::RealArgs;
+use crate::feed::Reader;
 use crate::{Ending, Usage};
 
 /// Pixels between two observations of φ in a recording.
@@ -53,6 +54,8 @@ struct RecordingStudy {
     indices: Vec<usize>,
     #[serde(skip)]
     frames: Vec<(FrameFiles, RigidMotion)>,
+    #[serde(skip)]
+    reader: Reader,
 }
 
 impl RecordingStudy {
@@ -66,6 +69,7 @@ impl RecordingStudy {
         }
         let sequence =
             source.sequences.into_iter().next().with_context(|| format!("{name}: has no frames"))?;
+        let reader = Reader::new(&sequence);
         let Some(rig) = sequence.rig else {
             bail!("{name}: has no calibration; give one with --calibration FILE");
         };
@@ -91,7 +95,15 @@ impl RecordingStudy {
             stride: args.stride,
             indices: frames.iter().map(|(frame, _)| frame.index).collect(),
             frames,
+            reader,
         })
+    }
+
+    fn read(&self, files: &FrameFiles) -> Result<StereoImages, RecordingError> {
+        let missing = || RecordingError::MissingRight(files.left.clone());
+        let right = files.right.as_ref().ok_or_else(missing)?;
+        let (left, right) = self.reader.images(files, right)?;
+        Ok(StereoImages { left, right })
     }
 
     /// The frames around the `k`-th one that has a neighbour on either side.
@@ -104,7 +116,7 @@ impl RecordingStudy {
 #[derive(Debug, thiserror::Error)]
 enum RecordingError {
     #[error(transparent)]
-    Read(#[from] IoError),
+    Read(#[from] Unanswered),
     #[error("{0}: the right image is missing")]
     MissingRight(PathBuf),
     #[error(transparent)]
@@ -127,7 +139,7 @@ impl Study for RecordingStudy {
     fn run(&self, part: usize) -> Result<Vec<Record>, RecordingError> {
         let Some([a, b, c]) = self.triple(part) else { return Ok(Vec::new()) };
         let triple = Triple {
-            frames: [read(&a.0)?, read(&b.0)?, read(&c.0)?],
+            frames: [self.read(&a.0)?, self.read(&b.0)?, self.read(&c.0)?],
             motion: [scene_motion(&a.1, &b.1), scene_motion(&b.1, &c.1)],
             draw: Draw { sequence: self.name.clone(), pose: b.0.index as i64, seed: self.how.seed },
         };
@@ -142,10 +154,4 @@ impl Study for RecordingStudy {
 /// φ of the scene between two true camera poses.
 fn scene_motion(before: &RigidMotion, after: &RigidMotion) -> Twist {
     after.inverse().after(before).log()
-}
-
-fn read(files: &FrameFiles) -> Result<StereoImages, RecordingError> {
-    let missing = || RecordingError::MissingRight(files.left.clone());
-    let right = files.right.as_ref().ok_or_else(missing)?;
-    Ok(StereoImages { left: image::read(&files.left)?, right: image::read(right)? })
 }

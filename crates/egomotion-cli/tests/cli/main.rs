@@ -14,6 +14,7 @@ mod interrupt;
 mod maps;
 mod outputs;
 mod process;
+mod raw;
 mod recording;
 mod selection;
 mod settings;

@@ -6,7 +6,7 @@ use egomotion::geometry::RigidMotion;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Clock, FrameFiles, KITTI_INTERVAL_S, Layout, Recognised, Sequence, listing};
-use crate::calibration::{Calibration, CameraPair};
+use crate::calibration::{self, Calibration, CameraPair, StereoCalibration};
 use crate::trajectory::{self, Format};
 use crate::{IoError, read};
 
@@ -23,17 +23,36 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
     )?;
     let mut frames = listing::pairs(&left_folder, &left, &right);
 
-    let file = calibration.map_or_else(|| folder.join("calib.txt"), Path::to_owned);
-    let calibration = Calibration::read(&file)?;
-    let rig = calibration.rig(pair, listing::image_size(&frames)?)?;
+    let own = folder.join("calib.txt");
+    let file = calibration.unwrap_or(&own);
+    let calibration = match calibration {
+        Some(file) => calibration::read(file)?,
+        None => StereoCalibration::Kitti(Calibration::read(file)?),
+    };
+    let rectified = calibration.pair(pair, listing::image_size(&frames)?, file)?;
     let clock = stamp(&mut frames, &folder.join("times.txt"))?;
     if let Some(poses) = poses_file(folder) {
-        add_truth(&mut frames, &poses, calibration.left_centre(pair)?)?;
+        let centre = match &calibration {
+            StereoCalibration::Kitti(kitti) => kitti.left_centre(pair)?,
+            _ => Vector3::zeros(),
+        };
+        add_truth(&mut frames, &poses, centre)?;
+        if let Some(rectification) = &rectified.rectification {
+            let truths = frames.iter_mut().filter_map(|frame| frame.truth.as_mut());
+            truths.for_each(|pose| *pose = rectification.world_from_rectified(pose));
+        }
     }
     let [l, r] = pair.cameras();
     let reason = format!("it holds image_{l} and image_{r} with numbered PNG files");
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let sequence = Sequence { name, frames, clock, rig: Some(rig), truth_maps: None };
+    let sequence = Sequence {
+        name,
+        frames,
+        clock,
+        rig: Some(rectified.rig),
+        rectification: rectified.rectification,
+        truth_maps: None,
+    };
     Ok(Some((Layout::KittiOdometry, reason, vec![sequence])))
 }
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Clock, KITTI_INTERVAL_S, Layout, Recognised, Sequence, TruthMaps, listing};
 use crate::IoError;
-use crate::calibration::{Calibration, CameraPair};
+use crate::calibration::{self, Calibration, CameraPair, StereoCalibration};
 
 /// The frame of a scene that the true maps belong to.
 const TRUTH_FRAME: usize = 10;
@@ -101,11 +101,23 @@ impl Set {
         frames.iter_mut().for_each(|f| f.time_s = KITTI_INTERVAL_S * (f.index - first) as f64);
 
         let name = format!("{scene:06}");
-        let file = calibration.map_or_else(|| self.calibration_file(folder, &name), Path::to_owned);
-        let rig = Calibration::read(&file)?.rig(self.pair, listing::image_size(&frames)?)?;
+        let own = self.calibration_file(folder, &name);
+        let file = calibration.unwrap_or(&own);
+        let calibration = match calibration {
+            Some(file) => calibration::read(file)?,
+            None => StereoCalibration::Kitti(Calibration::read(file)?),
+        };
+        let pair = calibration.pair(self.pair, listing::image_size(&frames)?, file)?;
         let truth_maps = self.truth(folder, &name);
         let clock = Clock::Assumed { interval_s: KITTI_INTERVAL_S };
-        Ok(Sequence { name, frames, clock, rig: Some(rig), truth_maps })
+        Ok(Sequence {
+            name,
+            frames,
+            clock,
+            rig: Some(pair.rig),
+            rectification: pair.rectification,
+            truth_maps,
+        })
     }
 
     /// The first of the set's calibration folders that has the file, or else the first.

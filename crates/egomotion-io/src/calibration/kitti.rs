@@ -1,7 +1,7 @@
 //! KITTI calibration files: lines `KEY: 12 numbers` of 3×4 projection matrices.
 //!
 //! The odometry set and the 2012 set call them `P0` … `P3`, the raw and 2015 sets `P_rect_00` …
-//! `P_rect_03`; 0 and 1 are the grey pair, 2 and 3 the colour pair.
+//! `P_rect_03` (`calib_cam_to_cam.txt`); 0 and 1 are the grey pair, 2 and 3 the colour pair.
 
 use std::path::{Path, PathBuf};
 
@@ -153,6 +153,12 @@ impl CameraPair {
             Self::Colour => [2, 3],
         }
     }
+}
+
+/// Whether a line of the text gives a projection by one of the names.
+pub(super) fn recognise(text: &str) -> bool {
+    let keys = read::lines(text).filter_map(|(_, line)| Some(line.split_once(':')?.0.trim()));
+    keys.take(1000).any(|key| (0..4).any(|camera| names(camera).iter().any(|name| name == key)))
 }
 
 /// The names of a camera's projection in the sets.
