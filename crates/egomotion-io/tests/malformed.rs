@@ -4,13 +4,15 @@
 use std::fs;
 use std::path::Path;
 
-use egomotion::geometry::{Distortion, Field, Grid, RigidMotion};
+use ::image as image_crate;
+use egomotion::geometry::{Distortion, Field, Gaussian, Grid, RigidMotion};
 use egomotion_io::calibration::{
     self, Calibration, CameraModel, CameraPair, RawPair, StereoCalibration, euroc, kalibr, opencv, rig, ros,
 };
+use egomotion_io::motion_table::{self, Motion, MotionRow};
 use egomotion_io::trajectory::{self, Pose};
-use egomotion_io::{IoError, disparity_png, flo, flow_png, image, pfm};
-use nalgebra::{Matrix3, Vector3};
+use egomotion_io::{IoError, disparity_png, flo, flow_png, image, pfm, stream};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -71,6 +73,40 @@ fn kinds() -> Vec<(&'static str, Vec<u8>, Reader, bool)> {
             true,
         ),
         (
+            "grey.jpg",
+            encoded(image_crate::ImageFormat::Jpeg),
+            |c, p| image::decode(c, p).map(drop),
+            // A JPEG's decoder fills up what is lost at the end.
+            false,
+        ),
+        ("grey.tif", encoded(image_crate::ImageFormat::Tiff), |c, p| image::decode(c, p).map(drop), true),
+        ("grey.pgm", encoded(image_crate::ImageFormat::Pnm), |c, p| image::decode(c, p).map(drop), true),
+        (
+            "stream.png",
+            [0, 1].map(|_| written(&|p| image::write_grey(p, field().grid()).unwrap())).concat(),
+            |c, p| {
+                let mut images = stream::ImageStream::new(c, stream::Kind::Png, p);
+                // Something must come of it, and a stream may end after any image.
+                let first = images.next_image()?.ok_or_else(|| IoError::new(p, "is empty", "give images"))?;
+                assert!(first.width() > 0);
+                while images.next_image()?.is_some() {}
+                Ok(())
+            },
+            false,
+        ),
+        (
+            "motion.txt",
+            motion_table::text(&[motion_row(), motion_row()]).into_bytes(),
+            |c, p| motion_table::parse(&String::from_utf8_lossy(c), p).map(drop),
+            false,
+        ),
+        (
+            "euroc_poses.txt",
+            written(&|p| trajectory::write_euroc(p, &poses).unwrap()),
+            |c, p| trajectory::parse(&String::from_utf8_lossy(c), None, p).map(drop),
+            false,
+        ),
+        (
             "tum.txt",
             written(&|p| trajectory::write_tum(p, &poses).unwrap()),
             |c, p| trajectory::parse(&String::from_utf8_lossy(c), None, p).map(drop),
@@ -114,6 +150,27 @@ fn kinds() -> Vec<(&'static str, Vec<u8>, Reader, bool)> {
             false,
         ),
     ]
+}
+
+/// A small picture in another format.
+fn encoded(format: image_crate::ImageFormat) -> Vec<u8> {
+    let picture = image_crate::GrayImage::from_fn(23, 17, |u, v| image_crate::Luma([(5 * u + 3 * v) as u8]));
+    let mut content = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut content, format).unwrap();
+    content.into_inner()
+}
+
+fn motion_row() -> MotionRow {
+    let phi = Gaussian { mean: Vector6::new(0.1, 0.2, -1.0, 1e-3, 2e-3, 0.0), cov: Matrix6::identity() };
+    let motion = Motion { phi, observed: [true; 6], rows: 900, inliers: 800 };
+    MotionRow {
+        frame: 7,
+        time_s: 0.7,
+        dt_s: Some(0.1),
+        motion: Some(motion),
+        impact_s: Some([2.0, 1.5, 3.0]),
+        status: "ok".into(),
+    }
 }
 
 /// Two cameras for images of any size.
