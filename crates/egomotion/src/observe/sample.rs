@@ -152,11 +152,12 @@ impl DensePair<'_> {
         Some(DepthFlow { x_px: x, y_px: y, disparity: Gaussian { mean, cov }, flow })
     }
 
-    /// Differential DV at the middle of the interval, from the flows of both cameras.
+    /// Differential DV at the middle of the interval, from the flows of both cameras; without the right one's,
+    /// from the change of disparity.
     pub fn stereo_flow(&self, u: usize, v: usize) -> Option<StereoFlow> {
+        let Some(right) = self.flow_right else { return Some(self.stereo_track(u, v)?.midpoint_flow()) };
         let before = self.before(u, v)?;
         let left = self.displacement(u, v)?;
-        let right = self.flow_right?;
         let at = u as f64 - self.rig.shift_from_disparity(before.mean.z);
         let right_x = right.u.sample(at, v as f64)?;
         let right_var = f64::from(right.cov_uu.at((at.round() as usize).min(right.size().0 - 1), v));

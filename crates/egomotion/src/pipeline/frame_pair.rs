@@ -8,7 +8,8 @@ use super::groups::{Groups, MovingGroup};
 use super::maps::{MotionMaps, motion_maps, track_sightings};
 use super::moving::Moving;
 use super::solve::{Observed, solve};
-use super::stereo::{StageTimes, Unanswered};
+use super::stereo::StageTimes;
+use super::unanswered::Unanswered;
 use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood, robust_start};
 use crate::estimate::systematic::common_errors;
 use crate::estimate::{MotionEstimate, Unsolvable};
@@ -34,6 +35,8 @@ pub(super) struct Reference {
     pub(super) time_s: f64,
     pub(super) images: StereoPyramid,
     pub(super) disparity: Option<DisparityMap>,
+    /// Given flow to the next frame.
+    pub(super) flow: Option<FlowField>,
     /// Corners that were followed here from the frame before.
     pub(super) corners: Vec<StereoCorner>,
 }
@@ -132,7 +135,10 @@ impl FramePair<'_> {
 
     fn hints<'b>(&'b self, motion: Option<&'b Twist>) -> Hints<'b> {
         let shift = self.before.disparity.as_ref().map(|d| &d.shift);
-        Hints { shift, motion, mask: self.mask }
+        let maps = self.before.disparity.as_ref().zip(self.after.disparity.as_ref());
+        let both_right = self.before.images.has_right() && self.after.images.has_right();
+        let given = maps.filter(|_| !both_right).map(|(before, after)| [before, after]);
+        Hints { shift, motion, mask: self.mask, given }
     }
 
     /// The motion of most tracks, or of those that go on as before where a body holds most.
@@ -200,8 +206,13 @@ impl FramePair<'_> {
         let differential = self.config.approach == Approach::Differential;
         let both = differential && matches!(self.config.method, Method::Dv | Method::Joint | Method::Ml);
         let prediction = rough.as_ref().ok();
+        let given = self.before.flow.as_ref().filter(|_| self.after.frame == self.before.frame + 1);
         let (flow, right) = timed(&mut stages.flow_ms, || {
-            let left = self.flow(Camera::Left, before, prediction, space);
+            let left = match given {
+                Some(given) => Some(given.clone()),
+                None => self.flow(Camera::Left, before, prediction, space),
+            };
+            let both = both && self.before.images.has_right() && self.after.images.has_right();
             let right = both.then(|| self.flow(Camera::Right, before, prediction, space));
             (left, right.flatten())
         });

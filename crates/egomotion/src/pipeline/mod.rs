@@ -2,16 +2,22 @@
 
 pub mod config;
 mod contested;
+pub mod frame;
 mod frame_pair;
 pub mod groups;
 mod map_row;
 pub mod maps;
 mod moving;
+pub mod rgbd;
 pub mod solve;
 pub mod stereo;
 pub mod trajectory;
+pub mod unanswered;
 
 pub use config::{Approach, Config, ConfigError, EstimatorKind, Method, Observe};
 pub use groups::MovingGroup;
-pub use stereo::{FrameMotion, StereoFrame, StereoMotion, Unanswered};
+pub use frame::{Frame, StereoFrame};
+pub use rgbd::{DepthCamera, DepthNoise, RgbdMotion};
+pub use stereo::{FrameMotion, StereoMotion};
 pub use trajectory::Trajectory;
+pub use unanswered::Unanswered;
