@@ -6,9 +6,9 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use egomotion::metrics;
-use egomotion::pipeline::Config;
+use egomotion::pipeline::{Config, StereoFrame, Unanswered};
 use egomotion::pipeline::stereo::DenseResults;
-use egomotion::sim::{SensorNoise, Sequence};
+use egomotion::sim::{SensorNoise, Sequence, StereoImages};
 
 use crate::Ending;
 use crate::args::DemoArgs;
@@ -82,11 +82,14 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
 
 fn render(sequence: &Sequence, noise: &SensorNoise, k: usize) -> Fetched {
     let start = Instant::now();
-    let pair = sequence.view(k).map(|view| noise.expose(&view.render(SAMPLES), k as u64));
+    let images = sequence.view(k).map(|view| noise.expose(&view.render(SAMPLES), k as u64));
+    let time_s = sequence.interval_s * k as f64;
     Fetched {
         index: k,
-        time_s: k as f64 * sequence.interval_s,
-        pair: pair.map(|images| (images.left, images.right)).ok_or(egomotion::pipeline::Unanswered::First),
+        time_s,
+        frame: images
+            .map(|StereoImages { left, right }| StereoFrame { time_s, left, right }.into())
+            .ok_or(Unanswered::First),
         truth: sequence.world_from_left(k),
         decode_ms: start.elapsed().as_secs_f64() * 1e3,
     }

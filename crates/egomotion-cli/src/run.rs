@@ -11,7 +11,7 @@ use egomotion::pipeline::{Config, Observe, Unanswered};
 use egomotion_io::image;
 use egomotion_io::source::{FrameFiles, Sequence, Source};
 
-use crate::args::RunArgs;
+use crate::args::{RunArgs, SensorArg};
 use crate::feed;
 use crate::judge::{self, MapVerdict};
 use crate::results::{About, ResultFolder};
@@ -139,6 +139,9 @@ fn run_sequence(
     let rig = sequence.rig.ok_or_else(|| {
         anyhow!("{}: no calibration; give one with --calibration FILE", args.source.display())
     })?;
+    let depth = sequence.depth_sensor.filter(|_| uses_depth(args, sequence));
+    let reader = feed::Reader { rig, depth, disparity: args.disparity.as_deref(), flow: args.flow.as_deref() };
+    check_sensor(args, sequence)?;
     let mask = args.mask.as_deref().map(|path| read_mask(path, &rig)).transpose()?;
     let folder = ResultFolder::create(out, args.maps)?;
     let bar = progress(frames.len(), args.quiet);
@@ -149,7 +152,7 @@ fn run_sequence(
     let outcome = session.run(
         stop,
         &folder,
-        |k| feed::read(frames[k].0, frames[k].1),
+        |k| reader.read(frames[k].0, frames[k].1, k + 1 == frames.len()),
         |row| {
             if let Err(why) = &row.motion.motion
                 && *why != Unanswered::First
@@ -180,6 +183,25 @@ fn run_sequence(
     };
     folder.write_report(&about, &outcome)?;
     Ok(DoneSequence { summary, first_failure })
+}
+
+/// The sensor that is asked for must be there.
+fn check_sensor(args: &RunArgs, sequence: &Sequence) -> Result<()> {
+    let (has, wanted) = match args.sensor {
+        Some(SensorArg::Depth) => (sequence.depth_sensor.is_some(), "depth images"),
+        Some(SensorArg::Stereo) => (sequence.frames.iter().any(|f| f.right.is_some()), "right images"),
+        None => return Ok(()),
+    };
+    if has { Ok(()) } else { Err(Usage(format!("{}: has no {wanted}", args.source.display())).into()) }
+}
+
+/// Whether depth images take the place of right ones: where there are no others, or as the user says.
+fn uses_depth(args: &RunArgs, sequence: &Sequence) -> bool {
+    let has_right = sequence.frames.iter().any(|frame| frame.right.is_some());
+    match args.sensor {
+        Some(sensor) => sensor == SensorArg::Depth,
+        None => !has_right,
+    }
 }
 
 /// What the report should say besides.

@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::Result;
 use egomotion::geometry::{Grid, Image, RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::stereo::StageTimes;
-use egomotion::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion, Trajectory, Unanswered};
+use egomotion::pipeline::{Config, FrameMotion, Observe, StereoMotion, Trajectory, Unanswered};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::feed::{Fetched, with_frames};
@@ -91,13 +91,13 @@ impl Session<'_> {
         let mut album = Album::default();
         with_frames(self.frames, stop, fetch, |frames| -> Result<()> {
             for fetched in frames {
-                let Fetched { index, time_s, pair, truth, decode_ms } = fetched;
+                let Fetched { index, time_s, frame, truth, decode_ms } = fetched;
                 truths.push(truth);
                 // Pictures show the maps over the image that they belong to.
                 let dense = self.config.observe == Observe::Dense;
-                let keep = pair.as_ref().ok().filter(|_| dense).map(|(left, _)| left.clone());
-                let motion = match pair {
-                    Ok((left, right)) => pipeline.push(StereoFrame { time_s, left, right }),
+                let keep = frame.as_ref().ok().filter(|_| dense).map(|frame| frame.left.clone());
+                let motion = match frame {
+                    Ok(frame) => pipeline.push(frame),
                     Err(why) => pipeline.skip(time_s, why),
                 };
                 if let Err(why) = &motion.motion

@@ -17,11 +17,14 @@
 #![deny(missing_docs)]
 
 pub mod calibration;
+pub mod depth;
 pub mod disparity_png;
 pub mod error;
 pub mod flo;
 pub mod flow_png;
+pub mod given;
 pub mod image;
+pub mod npy;
 pub mod pfm;
 mod raster;
 pub mod read;

@@ -3,11 +3,15 @@
 mod kitti_odometry;
 mod kitti_scenes;
 mod listing;
+mod moments;
+mod tartanair;
+mod tum_rgbd;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use egomotion::geometry::{RigidMotion, StereoRig};
+use egomotion::pipeline::rgbd::DepthNoise;
 
 use crate::IoError;
 
@@ -35,6 +39,23 @@ pub enum Layout {
     KittiStereoFlow2012,
     /// The scene flow set of 2015: colour scenes `image_2`, `image_3`, `calib_cam/`.
     KittiSceneFlow2015,
+    /// TUM's RGB-D set: `rgb.txt`, `depth.txt`, perhaps `groundtruth.txt`.
+    TumRgbd,
+    /// A trajectory of TartanAir 1: `image_left`, `depth_left`, perhaps `image_right` and `pose_left.txt`.
+    TartanAirV1,
+    /// A trajectory of TartanAir 2: `image_lcam_front`, `depth_lcam_front`, perhaps `image_rcam_front`.
+    TartanAirV2,
+}
+
+/// The depth camera of a sequence, whose depth images lie on the left image's pixels.
+///
+/// [`Sequence::rig`] is then its rig: where it has no second camera, one with a virtual baseline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthSensor {
+    /// How noisy its depth is.
+    pub noise: DepthNoise,
+    /// Scale of 16-bit depth images, in levels per metre.
+    pub levels_per_m: f64,
 }
 
 /// Consecutive stereo pairs of one rig.
@@ -49,6 +70,8 @@ pub struct Sequence {
     pub clock: Clock,
     /// The rectified rig; `None` where the layout has no calibration.
     pub rig: Option<StereoRig>,
+    /// What took the depth images; `None` where the layout has none.
+    pub depth_sensor: Option<DepthSensor>,
     /// True maps, where the layout has them.
     pub truth_maps: Option<TruthMaps>,
 }
@@ -63,6 +86,8 @@ pub struct FrameFiles {
     pub left: PathBuf,
     /// Right image; `None` if it is missing.
     pub right: Option<PathBuf>,
+    /// Depth image on the left image's pixels, a file for [`crate::depth`]; `None` if there is none.
+    pub depth: Option<PathBuf>,
     /// Time stamp, in seconds; strictly increasing.
     pub time_s: f64,
     /// True pose of the left camera, `world_from_camera`, if known.
@@ -97,7 +122,8 @@ pub struct TruthMaps {
 
 /// The layouts for error messages.
 const KNOWN: &str = "known layouts: KITTI odometry (image_0, image_1 or image_2, image_3, and calib.txt), \
-                     KITTI 2012 and 2015 scenes (training/ with image_0, image_1 or image_2, image_3)";
+                     KITTI 2012 and 2015 scenes (training/ with image_0, image_1 or image_2, image_3), \
+                     TUM RGB-D (rgb.txt, depth.txt), TartanAir (image_lcam_front or image_left)";
 
 /// Interval of the KITTI cameras, assumed where there are no time stamps, in seconds.
 const KITTI_INTERVAL_S: f64 = 0.1;
@@ -125,11 +151,18 @@ impl Source {
                 format_args!("give a sequence folder; {KNOWN}"),
             ));
         }
-        let recognised = kitti_scenes::recognise(&folder, calibration)?;
-        let recognised = match recognised {
-            Some(found) => Some(found),
-            None => kitti_odometry::recognise(&folder, calibration)?,
-        };
+        let mut recognised = None;
+        for layout in [
+            kitti_scenes::recognise,
+            kitti_odometry::recognise,
+            tum_rgbd::recognise,
+            tartanair::recognise,
+        ] {
+            recognised = layout(&folder, calibration)?;
+            if recognised.is_some() {
+                break;
+            }
+        }
         let (layout, reason, sequences) = recognised.ok_or_else(|| unknown(path, &folder))?;
         Ok(Self { path: path.to_owned(), layout, reason, sequences })
     }
@@ -157,6 +190,9 @@ impl fmt::Display for Layout {
             Self::KittiOdometry => "KITTI odometry",
             Self::KittiStereoFlow2012 => "KITTI stereo and flow 2012",
             Self::KittiSceneFlow2015 => "KITTI scene flow 2015",
+            Self::TumRgbd => "TUM RGB-D",
+            Self::TartanAirV1 => "TartanAir 1",
+            Self::TartanAirV2 => "TartanAir 2",
         })
     }
 }

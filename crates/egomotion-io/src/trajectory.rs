@@ -16,11 +16,13 @@ pub struct Pose {
     pub world_from_camera: RigidMotion,
 }
 
-/// Which of the two row formats.
+/// Which of the row formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// `timestamp tx ty tz qx qy qz qw`: 8 numbers a row.
     Tum,
+    /// `tx ty tz qx qy qz qw`: 7 numbers a row.
+    TumWithoutTime,
     /// The upper 3×4 of the pose matrix, row by row: 12 numbers a row.
     Kitti,
 }
@@ -46,6 +48,7 @@ pub fn read(path: &Path, format: Option<Format>) -> Result<Vec<Pose>, IoError> {
 pub fn parse(text: &str, format: Option<Format>, path: &Path) -> Result<Vec<Pose>, IoError> {
     let (shape, advice) = match format {
         Some(Format::Tum) => ("8", "give `timestamp tx ty tz qx qy qz qw`"),
+        Some(Format::TumWithoutTime) => ("7", "give `tx ty tz qx qy qz qw`"),
         Some(Format::Kitti) => ("12", "give the 12 numbers of a 3x4 matrix"),
         None => ("8 or 12", "give TUM rows (8 numbers) or KITTI rows (12 numbers)"),
     };
@@ -53,6 +56,9 @@ pub fn parse(text: &str, format: Option<Format>, path: &Path) -> Result<Vec<Pose
         let row = read::numbers(line)?;
         match (format, row.len()) {
             (None | Some(Format::Tum), 8) => tum_pose(&row),
+            (Some(Format::TumWithoutTime), 7) => {
+                Ok(Pose { time_s: None, ..tum_pose(&[&[0.0], row.as_slice()].concat())? })
+            }
             (None | Some(Format::Kitti), 12) => kitti_pose(&row),
             (_, n) => Err(format!("the row has {n} numbers, not {shape}")),
         }

@@ -222,7 +222,7 @@ const NEWTON: usize = 12;
 const LONGEST: f64 = 3.0;
 
 /// q of every observation in front of the camera, with the structure held at its measured value (the Sampson form).
-pub(super) fn squares<M: Measurement>(observations: &[M], at: &At<'_>) -> Vec<f64> {
+pub(crate) fn squares<M: Measurement>(observations: &[M], at: &At<'_>) -> Vec<f64> {
     let square = |o: &M| {
         let l = o.linearise(&mut o.structure(), at)?;
         Some(l.misclosure.dot(&(l.inverse_cov * l.misclosure)))

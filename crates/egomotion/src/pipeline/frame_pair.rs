@@ -7,6 +7,7 @@ use super::contested::scene_motion;
 use super::groups::{Groups, MovingGroup};
 use super::maps::{MotionMaps, motion_maps, track_sightings};
 use super::moving::Moving;
+use super::shape::solve_with_shape;
 use super::solve::{Observed, solve};
 use super::stereo::StageTimes;
 use super::unanswered::Unanswered;
@@ -219,9 +220,14 @@ impl FramePair<'_> {
         let Some(flow) = flow else {
             return nothing(Unanswered::Unsolvable(Unsolvable::FewRows { rows: 0, needed: 6 }));
         };
-        let pair = DensePair { rig: self.rig, before, after, flow: &flow, flow_right: right.as_ref() };
-        let start = rough.unwrap_or_else(|_| Twist::zero());
+        let shaped = self.hints(None).given.is_some();
+        let pair = DensePair { rig: self.rig, before, after, flow: &flow, flow_right: right.as_ref(), given: shaped };
+        let by_shape = shaped && (self.config.method, self.config.approach) == (Method::Ml, Approach::Discrete);
         let motion = timed(&mut stages.estimate_ms, || {
+            if by_shape {
+                return solve_with_shape(&pair, tracks, rough.as_ref().ok(), self.config)?.known();
+            }
+            let start = rough.unwrap_or_else(|_| Twist::zero());
             solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config)
         });
         let rows = row_disagreement(&self.before.images, tracks, self.rig);

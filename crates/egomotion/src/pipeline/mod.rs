@@ -9,6 +9,7 @@ mod map_row;
 pub mod maps;
 mod moving;
 pub mod rgbd;
+mod shape;
 pub mod solve;
 pub mod stereo;
 pub mod trajectory;

@@ -1,0 +1,98 @@
+//! The layout of TUM's RGB-D set: `rgb.txt`, `depth.txt`, `groundtruth.txt`.
+
+use std::path::Path;
+
+use egomotion::geometry::StereoRig;
+use egomotion::pipeline::rgbd::{DepthNoise, VIRTUAL_BASELINE_M};
+
+use super::moments::{associate, pose_at, stamped_files};
+use super::{Clock, DepthSensor, FrameFiles, Layout, Recognised, Sequence, listing};
+use crate::trajectory::{self, Format};
+use crate::{IoError, read};
+
+/// Longest time between an image and the depth that belongs to it, in seconds: that of the set's own tool.
+const SAME_MOMENT_S: f64 = 0.02;
+/// Levels of the depth images per metre.
+const LEVELS_PER_M: f64 = 5000.0;
+
+/// fx, fy, cx, cy of the colour cameras of freiburg1, 2 and 3, as the set publishes them.
+const INTRINSICS: [[f64; 4]; 3] =
+    [[517.3, 516.5, 318.6, 255.3], [520.9, 521.0, 325.1, 249.7], [535.4, 539.2, 320.1, 247.6]];
+
+/// The folder as a recording of a depth camera; `None` if it has no `rgb.txt` and `depth.txt`.
+pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Option<Recognised>, IoError> {
+    let [rgb, depth] = ["rgb.txt", "depth.txt"].map(|name| folder.join(name));
+    if !(rgb.is_file() && depth.is_file()) {
+        return Ok(None);
+    }
+    let (images, depths) = (stamped_files(&rgb)?, stamped_files(&depth)?);
+    if images.is_empty() {
+        return Err(IoError::new(&rgb, "lists no image", "give `time file` a line"));
+    }
+    let times = |files: &[(f64, _)]| files.iter().map(|(time, _)| *time).collect::<Vec<f64>>();
+    let belonging = associate(&times(&images), &times(&depths), SAME_MOMENT_S);
+    let truth = match folder.join("groundtruth.txt") {
+        file if file.is_file() => trajectory::read(&file, Some(Format::Tum))?,
+        _ => Vec::new(),
+    };
+    let frame = |(index, ((time_s, left), depth)): (usize, ((f64, _), Option<usize>))| FrameFiles {
+        index,
+        left,
+        right: None,
+        depth: depth.and_then(|k| depths.get(k)).map(|(_, path)| path.clone()),
+        time_s,
+        truth: pose_at(&truth, time_s),
+    };
+    let frames: Vec<FrameFiles> = images.into_iter().zip(belonging).enumerate().map(frame).collect();
+    let size = listing::image_size(&frames)?;
+    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let rig = rig(folder, &name, calibration, size)?;
+    let sequence = Sequence {
+        name,
+        frames,
+        clock: Clock::Measured,
+        rig: Some(rig),
+        depth_sensor: Some(DepthSensor { noise: DepthNoise::kinect(), levels_per_m: LEVELS_PER_M }),
+        truth_maps: None,
+    };
+    let reason = "it holds rgb.txt and depth.txt".to_owned();
+    Ok(Some((Layout::TumRgbd, reason, vec![sequence])))
+}
+
+/// By the given file, `calibration.txt`, or the number in the folder's name.
+fn rig(
+    folder: &Path,
+    name: &str,
+    calibration: Option<&Path>,
+    size: (usize, usize),
+) -> Result<StereoRig, IoError> {
+    let own = folder.join("calibration.txt");
+    let file = calibration.or_else(|| own.is_file().then_some(&own));
+    let [fx, fy, cx, cy] = match file {
+        Some(file) => intrinsics(file)?,
+        None => (1..=3)
+            .find(|n| name.contains(&format!("freiburg{n}")) || name.contains(&format!("fr{n}_")))
+            .and_then(|n| INTRINSICS.get(n - 1).copied())
+            .ok_or_else(|| {
+                IoError::new(
+                    folder,
+                    "its name does not tell the camera (freiburg1, 2 or 3)",
+                    "give calibration.txt or --calibration FILE with fx fy cx cy",
+                )
+            })?,
+    };
+    let rig = StereoRig::new(fx, (cx, cy), VIRTUAL_BASELINE_M, size);
+    let rig = rig.map(|rig| StereoRig { focal_y_px: fy, ..rig });
+    rig.and_then(|rig| rig.check().map(|()| rig))
+        .map_err(|error| IoError::new(file.unwrap_or(folder), error, "give fx fy cx cy in pixels"))
+}
+
+/// fx fy cx cy, the first four numbers of a file.
+fn intrinsics(file: &Path) -> Result<[f64; 4], IoError> {
+    let text = read::text(file)?;
+    let refuse = |reason: String| IoError::new(file, reason, "give fx fy cx cy in pixels");
+    let (line, content) = read::lines(&text).next().ok_or_else(|| refuse("holds no numbers".into()))?;
+    let numbers = read::numbers(content).map_err(|reason| refuse(reason).at_line(line))?;
+    let first = numbers.first_chunk::<4>().copied();
+    first.ok_or_else(|| refuse(format!("has {} numbers, not 4", numbers.len())).at_line(line))
+}
