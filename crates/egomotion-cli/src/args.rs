@@ -85,6 +85,9 @@ pub struct RunArgs {
     /// Folder of flow maps to the next frame in place of our own: .flo, .npy or KITTI PNG, named alike.
     #[arg(long, value_name = "DIR")]
     pub flow: Option<PathBuf>,
+    /// Stereo tracks in place of images: CSV (frame,track,u_left,v_left,u_right,v_right[,time_s]) or .npz.
+    #[arg(long, value_name = "FILE")]
+    pub tracks: Option<PathBuf>,
     /// Calibration to use in place of the source's own (KITTI calib.txt).
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,

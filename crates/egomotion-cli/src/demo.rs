@@ -12,7 +12,7 @@ use egomotion::sim::{SensorNoise, Sequence, StereoImages};
 
 use crate::Ending;
 use crate::args::DemoArgs;
-use crate::feed::Fetched;
+use crate::feed::{Fetched, Given};
 use crate::judge::MapTally;
 use crate::results::{About, ResultFolder};
 use crate::run::set_threads;
@@ -39,6 +39,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         config: &config,
         frames: sequence.frames(),
         mask: None,
+        tracks: false,
         maps: false,
         progress: progress(sequence.frames(), args.quiet),
     };
@@ -88,7 +89,7 @@ fn render(sequence: &Sequence, noise: &SensorNoise, k: usize) -> Fetched {
         index: k,
         time_s,
         frame: images
-            .map(|StereoImages { left, right }| StereoFrame { time_s, left, right }.into())
+            .map(|StereoImages { left, right }| Given::Frame(StereoFrame { time_s, left, right }.into()))
             .ok_or(Unanswered::First),
         truth: sequence.world_from_left(k),
         decode_ms: start.elapsed().as_secs_f64() * 1e3,

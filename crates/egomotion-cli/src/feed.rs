@@ -7,8 +7,9 @@ use std::time::Instant;
 
 use egomotion::geometry::{Field, Grid, Image, RigidMotion, StereoRig};
 use egomotion::observe::{DisparityMap, FlowField};
-use egomotion::pipeline::{DepthCamera, Frame, Unanswered};
+use egomotion::pipeline::{DepthCamera, Frame, TrackPoint, Unanswered};
 use egomotion_io::source::{DepthSensor, FrameFiles};
+use egomotion_io::tracks::TrackTable;
 use egomotion_io::{IoError, depth, given, image, pfm};
 
 /// One frame as it comes out of its files.
@@ -16,11 +17,19 @@ pub struct Fetched {
     /// Index of the frame in the source.
     pub index: usize,
     pub time_s: f64,
-    /// Images and maps, or why they cannot be used.
-    pub frame: Result<Frame, Unanswered>,
+    /// What is given of this time, or why it cannot be used.
+    pub frame: Result<Given, Unanswered>,
     /// True pose world_from_camera.
     pub truth: Option<RigidMotion>,
     pub decode_ms: f64,
+}
+
+/// What is given of one time.
+pub enum Given {
+    /// Images, and perhaps maps.
+    Frame(Frame),
+    /// Points of tracks that others made.
+    Tracks(Vec<TrackPoint>),
 }
 
 /// Frames fetched while earlier ones are worked on.
@@ -59,6 +68,8 @@ pub struct Reader<'a> {
     pub disparity: Option<&'a Path>,
     /// Folder of flow maps that take the place of our own.
     pub flow: Option<&'a Path>,
+    /// Tracks that take the place of images.
+    pub tracks: Option<&'a TrackTable>,
 }
 
 /// Standard deviation of a given disparity or flow that comes without one, in pixels.
@@ -68,7 +79,10 @@ impl Reader<'_> {
     /// Read one frame; what cannot be read becomes the frame's status. The `last` frame has no flow.
     pub fn read(&self, files: &FrameFiles, time_s: f64, last: bool) -> Fetched {
         let start = Instant::now();
-        let frame = self.frame(files, time_s, last);
+        let frame = match self.tracks {
+            Some(table) => Ok(Given::Tracks(table.frames.get(&files.index).cloned().unwrap_or_default())),
+            None => self.frame(files, time_s, last).map(Given::Frame),
+        };
         Fetched {
             index: files.index,
             time_s,

@@ -10,6 +10,7 @@ use egomotion::geometry::{Grid, StereoRig};
 use egomotion::pipeline::{Config, Observe, Unanswered};
 use egomotion_io::image;
 use egomotion_io::source::{FrameFiles, Sequence, Source};
+use egomotion_io::tracks;
 
 use crate::args::{RunArgs, SensorArg};
 use crate::feed;
@@ -140,13 +141,29 @@ fn run_sequence(
         anyhow!("{}: no calibration; give one with --calibration FILE", args.source.display())
     })?;
     let depth = sequence.depth_sensor.filter(|_| uses_depth(args, sequence));
-    let reader = feed::Reader { rig, depth, disparity: args.disparity.as_deref(), flow: args.flow.as_deref() };
+    let tracks = args.tracks.as_deref().or(sequence.tracks.as_deref()).map(tracks::read).transpose()?;
+    // Tracks are sparse, whatever was asked for.
+    let config = &match &tracks {
+        Some(_) => Config { observe: Observe::Sparse, ..config.clone() },
+        None => config.clone(),
+    };
+    config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
+    if tracks.is_some() && (args.maps || args.disparity.is_some() || args.flow.is_some()) {
+        return Err(Usage("--maps, --disparity and --flow need images, not tracks".into()).into());
+    }
+    let reader = feed::Reader {
+        rig,
+        depth,
+        disparity: args.disparity.as_deref(),
+        flow: args.flow.as_deref(),
+        tracks: tracks.as_ref(),
+    };
     check_sensor(args, sequence)?;
     let mask = args.mask.as_deref().map(|path| read_mask(path, &rig)).transpose()?;
     let folder = ResultFolder::create(out, args.maps)?;
     let bar = progress(frames.len(), args.quiet);
     bar.set_message(sequence.name.clone());
-    let session = Session { rig, config, frames: frames.len(), mask, maps: args.maps, progress: bar };
+    let session = Session { rig, config, frames: frames.len(), mask, tracks: tracks.is_some(), maps: args.maps, progress: bar };
     let mut truth_maps: Option<MapVerdict> = None;
     let mut first_failure = None;
     let outcome = session.run(

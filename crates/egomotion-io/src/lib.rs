@@ -25,10 +25,12 @@ pub mod flow_png;
 pub mod given;
 pub mod image;
 pub mod npy;
+pub mod npz;
 pub mod pfm;
 mod raster;
 pub mod read;
 pub mod source;
+pub mod tracks;
 pub mod trajectory;
 pub mod write;
 

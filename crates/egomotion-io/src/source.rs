@@ -1,5 +1,6 @@
 //! What a SOURCE folder holds: its layout, frames, time stamps, rig and truth.
 
+mod feature_tracks;
 mod kitti_odometry;
 mod kitti_scenes;
 mod listing;
@@ -45,6 +46,8 @@ pub enum Layout {
     TartanAirV1,
     /// A trajectory of TartanAir 2: `image_lcam_front`, `depth_lcam_front`, perhaps `image_rcam_front`.
     TartanAirV2,
+    /// Stereo tracks with their rig in an `.npz`, and no images.
+    FeatureTracks,
 }
 
 /// The depth camera of a sequence, whose depth images lie on the left image's pixels.
@@ -72,6 +75,8 @@ pub struct Sequence {
     pub rig: Option<StereoRig>,
     /// What took the depth images; `None` where the layout has none.
     pub depth_sensor: Option<DepthSensor>,
+    /// File of stereo tracks in place of images, for [`crate::tracks`].
+    pub tracks: Option<PathBuf>,
     /// True maps, where the layout has them.
     pub truth_maps: Option<TruthMaps>,
 }
@@ -123,7 +128,8 @@ pub struct TruthMaps {
 /// The layouts for error messages.
 const KNOWN: &str = "known layouts: KITTI odometry (image_0, image_1 or image_2, image_3, and calib.txt), \
                      KITTI 2012 and 2015 scenes (training/ with image_0, image_1 or image_2, image_3), \
-                     TUM RGB-D (rgb.txt, depth.txt), TartanAir (image_lcam_front or image_left)";
+                     TUM RGB-D (rgb.txt, depth.txt), TartanAir (image_lcam_front or image_left), \
+                     stereo tracks (one .npz with features, K, b)";
 
 /// Interval of the KITTI cameras, assumed where there are no time stamps, in seconds.
 const KITTI_INTERVAL_S: f64 = 0.1;
@@ -144,6 +150,11 @@ impl Source {
     /// As [`Source::open`]; and what is wrong with the calibration file.
     pub fn open_with(path: &Path, calibration: Option<&Path>) -> Result<Self, IoError> {
         let folder = path.canonicalize().map_err(|error| IoError::system(path, "open", &error))?;
+        if let (true, Some((layout, reason, sequences))) =
+            (folder.is_file(), feature_tracks::recognise(&folder, calibration)?)
+        {
+            return Ok(Self { path: path.to_owned(), layout, reason, sequences });
+        }
         if !folder.is_dir() {
             return Err(IoError::new(
                 path,
@@ -157,6 +168,7 @@ impl Source {
             kitti_odometry::recognise,
             tum_rgbd::recognise,
             tartanair::recognise,
+            feature_tracks::recognise,
         ] {
             recognised = layout(&folder, calibration)?;
             if recognised.is_some() {
@@ -193,6 +205,7 @@ impl fmt::Display for Layout {
             Self::TumRgbd => "TUM RGB-D",
             Self::TartanAirV1 => "TartanAir 1",
             Self::TartanAirV2 => "TartanAir 2",
+            Self::FeatureTracks => "stereo tracks",
         })
     }
 }

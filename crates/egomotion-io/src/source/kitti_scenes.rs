@@ -105,7 +105,7 @@ impl Set {
         let rig = Calibration::read(&file)?.rig(self.pair, listing::image_size(&frames)?)?;
         let truth_maps = self.truth(folder, &name);
         let clock = Clock::Assumed { interval_s: KITTI_INTERVAL_S };
-        Ok(Sequence { name, frames, clock, rig: Some(rig), depth_sensor: None, truth_maps })
+        Ok(Sequence { name, frames, clock, rig: Some(rig), depth_sensor: None, tracks: None, truth_maps })
     }
 
     /// The first of the set's calibration folders that has the file, or else the first.

@@ -97,6 +97,7 @@ impl Version {
             clock: Clock::Assumed { interval_s: INTERVAL_S },
             rig: Some(rig),
             depth_sensor: has_depth.then_some(DepthSensor { noise: DepthNoise::exact(), levels_per_m: 1.0 }),
+            tracks: None,
             truth_maps: None,
         };
         Ok((self.layout, format!("it holds image_{camera} with files named NUMBER_{camera}"), vec![sequence]))

@@ -53,6 +53,7 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
         clock: Clock::Measured,
         rig: Some(rig),
         depth_sensor: Some(DepthSensor { noise: DepthNoise::kinect(), levels_per_m: LEVELS_PER_M }),
+        tracks: None,
         truth_maps: None,
     };
     let reason = "it holds rgb.txt and depth.txt".to_owned();
