@@ -100,6 +100,10 @@ impl Reader<'_> {
             let left = image::read(&files.left).map_err(bad)?;
             let depth_m = depth::read(file, sensor.levels_per_m).map_err(bad)?;
             let camera = DepthCamera { rig: self.rig, noise: sensor.noise };
+            let (left, depth_m) = match &sensor.lens {
+                Some(lens) => (lens.image(&self.rig, &left), lens.depth(&self.rig, &depth_m)),
+                None => (left, depth_m),
+            };
             let frame = camera.frame(time_s, left, &depth_m);
             return Ok(Frame { disparity: given.or(frame.disparity), flow, ..frame });
         }

@@ -24,6 +24,7 @@ pub mod flo;
 pub mod flow_png;
 pub mod given;
 pub mod image;
+pub mod lens;
 pub mod npy;
 pub mod npz;
 pub mod pfm;

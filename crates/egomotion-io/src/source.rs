@@ -15,6 +15,7 @@ use egomotion::geometry::{RigidMotion, StereoRig};
 use egomotion::pipeline::rgbd::DepthNoise;
 
 use crate::IoError;
+use crate::lens::Lens;
 
 /// A recognised recording: one sequence, or a set of independent scenes.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,6 +60,8 @@ pub struct DepthSensor {
     pub noise: DepthNoise,
     /// Scale of 16-bit depth images, in levels per metre.
     pub levels_per_m: f64,
+    /// Distortion of both images, which are warped by it when fetched.
+    pub lens: Option<Lens>,
 }
 
 /// Consecutive stereo pairs of one rig.

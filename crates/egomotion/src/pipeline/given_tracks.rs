@@ -26,6 +26,8 @@ pub struct TrackPoint {
 
 /// Standard deviation of a given place until its residuals tell, in pixels.
 const PLACE_SIGMA_PX: f64 = 0.5;
+/// Of fewer tracks the distribution of their residuals cannot be told: then Student's t is taken as it stands.
+const FEWEST_FITTED: usize = 200;
 /// Frames since the reference without an answer, after which it is given up.
 const MOST_FAILURES: usize = 2;
 
@@ -144,7 +146,9 @@ impl TrackMotion {
             .collect();
         let mut rows: Vec<f64> = pairs.iter().map(|(a, _)| a.right.1 - a.left.1).collect();
         let rows = Some(median(&mut rows).abs()).filter(|rows| rows.is_finite());
-        let solver = TrackSolver { rig: &self.rig, config: &self.config, dt_s };
+        let mut config = self.config.clone();
+        config.maximum_likelihood.kernel.fitted &= tracks.len() >= FEWEST_FITTED;
+        let solver = TrackSolver { rig: &self.rig, config: &config, dt_s };
         let rough = solver.rough(&tracks, prior.as_ref());
         let result = solver.sparse(&tracks, rough, rows, &mut stages);
         let answer = FrameMotion {
