@@ -99,6 +99,18 @@ pub struct RunArgs {
     /// Every pixel with all maps, or tracked corners alone at the highest rate [default: dense].
     #[arg(long, value_enum)]
     pub observe: Option<ObserveArg>,
+    /// Which camera to use where a source has both [default: stereo].
+    #[arg(long, value_enum)]
+    pub sensor: Option<SensorArg>,
+    /// Folder of disparity maps in place of our own: PFM, .npy or KITTI PNG, named as the left images or by number.
+    #[arg(long, value_name = "DIR")]
+    pub disparity: Option<PathBuf>,
+    /// Folder of flow maps to the next frame in place of our own: .flo, .npy or KITTI PNG, named alike.
+    #[arg(long, value_name = "DIR")]
+    pub flow: Option<PathBuf>,
+    /// Stereo tracks in place of images: CSV (frame,track,u_left,v_left,u_right,v_right[,time_s]) or .npz.
+    #[arg(long, value_name = "FILE")]
+    pub tracks: Option<PathBuf>,
     /// Calibration to use in place of the source's own: KITTI, EuRoC sensor.yaml, Kalibr camchain, OpenCV
     /// YAML or XML, ROS CameraInfo, or rig.toml; raw cameras are rectified.
     #[arg(long, value_name = "FILE")]
@@ -364,6 +376,14 @@ choice!(ObserveArg for Observe {
     Dense: "Disparity and flow of every pixel, with all maps.",
     Sparse: "Tracked corners alone.",
 });
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SensorArg {
+    /// Left and right images.
+    Stereo,
+    /// Left images and depth images.
+    Depth,
+}
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum FormatArg {

@@ -6,13 +6,13 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use egomotion::metrics;
-use egomotion::pipeline::Config;
 use egomotion::pipeline::stereo::DenseResults;
-use egomotion::sim::{SensorNoise, Sequence};
+use egomotion::pipeline::{Config, StereoFrame, Unanswered};
+use egomotion::sim::{SensorNoise, Sequence, StereoImages};
 
 use crate::Ending;
 use crate::args::DemoArgs;
-use crate::feed::Fetched;
+use crate::feed::{Fetched, Given};
 use crate::judge::MapTally;
 use crate::results::{About, ResultFolder};
 use crate::run::set_threads;
@@ -39,6 +39,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         config: &config,
         frames: sequence.frames(),
         mask: None,
+        tracks: false,
         maps: false,
         progress: progress(sequence.frames(), args.quiet),
     };
@@ -82,11 +83,14 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
 
 fn render(sequence: &Sequence, noise: &SensorNoise, k: usize) -> Fetched {
     let start = Instant::now();
-    let pair = sequence.view(k).map(|view| noise.expose(&view.render(SAMPLES), k as u64));
+    let images = sequence.view(k).map(|view| noise.expose(&view.render(SAMPLES), k as u64));
+    let time_s = sequence.interval_s * k as f64;
     Fetched {
         index: k,
-        time_s: k as f64 * sequence.interval_s,
-        pair: pair.map(|images| (images.left, images.right)).ok_or(egomotion::pipeline::Unanswered::First),
+        time_s,
+        frame: images
+            .map(|StereoImages { left, right }| Given::Frame(StereoFrame { time_s, left, right }.into()))
+            .ok_or(Unanswered::First),
         truth: sequence.world_from_left(k),
         decode_ms: start.elapsed().as_secs_f64() * 1e3,
     }

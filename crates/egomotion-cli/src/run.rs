@@ -10,8 +10,9 @@ use egomotion::geometry::{Grid, StereoRig};
 use egomotion::pipeline::{Config, Observe, Unanswered};
 use egomotion_io::image;
 use egomotion_io::source::{FrameFiles, Sequence, Source};
+use egomotion_io::tracks;
 
-use crate::args::RunArgs;
+use crate::args::{RunArgs, SensorArg};
 use crate::feed;
 use crate::judge::{self, MapVerdict};
 use crate::results::{About, ResultFolder};
@@ -140,19 +141,43 @@ fn run_sequence(
     let rig = sequence.rig.ok_or_else(|| {
         anyhow!("{}: no calibration; give one with --calibration FILE", args.source.display())
     })?;
-    let reader = feed::Reader::new(sequence);
+    let tracks = args.tracks.as_deref().or(sequence.tracks.as_deref()).map(tracks::read).transpose()?;
+    // Tracks are sparse, whatever was asked for.
+    let config = &match &tracks {
+        Some(_) => Config { observe: Observe::Sparse, ..config.clone() },
+        None => config.clone(),
+    };
+    config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
+    if tracks.is_some() && (args.maps || args.disparity.is_some() || args.flow.is_some()) {
+        return Err(Usage("--maps, --disparity and --flow need images, not tracks".into()).into());
+    }
+    check_sensor(args, sequence)?;
+    let reader = feed::Reader {
+        disparity: args.disparity.as_deref(),
+        flow: args.flow.as_deref(),
+        tracks: tracks.as_ref(),
+        ..feed::Reader::new(sequence, uses_depth(args, sequence))
+    };
     let mask = args.mask.as_deref().map(|path| read_mask(path, &rig)).transpose()?;
     let mask = joined(mask, reader.unseen());
     let folder = ResultFolder::create(out, args.maps)?;
     let bar = progress(frames.len(), args.quiet);
     bar.set_message(sequence.name.clone());
-    let session = Session { rig, config, frames: frames.len(), mask, maps: args.maps, progress: bar };
+    let session = Session {
+        rig,
+        config,
+        frames: frames.len(),
+        mask,
+        tracks: tracks.is_some(),
+        maps: args.maps,
+        progress: bar,
+    };
     let mut truth_maps: Option<MapVerdict> = None;
     let mut first_failure = None;
     let outcome = session.run(
         stop,
         &folder,
-        |k| reader.read(frames[k].0, frames[k].1),
+        |k| reader.read(frames[k].0, frames[k].1, k + 1 == frames.len()),
         |row| {
             if let Err(why) = &row.motion.motion
                 && *why != Unanswered::First
@@ -186,6 +211,25 @@ fn run_sequence(
     };
     folder.write_report(&about, &outcome)?;
     Ok(DoneSequence { summary, first_failure })
+}
+
+/// The sensor that is asked for must be there.
+fn check_sensor(args: &RunArgs, sequence: &Sequence) -> Result<()> {
+    let (has, wanted) = match args.sensor {
+        Some(SensorArg::Depth) => (sequence.depth_sensor.is_some(), "depth images"),
+        Some(SensorArg::Stereo) => (sequence.frames.iter().any(|f| f.right.is_some()), "right images"),
+        None => return Ok(()),
+    };
+    if has { Ok(()) } else { Err(Usage(format!("{}: has no {wanted}", args.source.display())).into()) }
+}
+
+/// Whether depth images take the place of right ones: where there are no others, or as the user says.
+fn uses_depth(args: &RunArgs, sequence: &Sequence) -> bool {
+    let has_right = sequence.frames.iter().any(|frame| frame.right.is_some());
+    match args.sensor {
+        Some(sensor) => sensor == SensorArg::Depth,
+        None => !has_right,
+    }
 }
 
 /// What the report should say besides.

@@ -7,10 +7,10 @@ use std::time::Instant;
 use anyhow::Result;
 use egomotion::geometry::{Grid, Image, RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::stereo::StageTimes;
-use egomotion::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion, Trajectory, Unanswered};
+use egomotion::pipeline::{Config, FrameMotion, Observe, StereoMotion, TrackMotion, Trajectory, Unanswered};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::feed::{Fetched, with_frames};
+use crate::feed::{Fetched, Given, with_frames};
 use crate::report::{Album, FramePictures};
 use crate::results::ResultFolder;
 use crate::terminal::tell;
@@ -23,6 +23,8 @@ pub struct Session<'a> {
     pub frames: usize,
     /// Pixels never to use.
     pub mask: Option<Grid<bool>>,
+    /// Frames are tracks, not images.
+    pub tracks: bool,
     /// Write the maps of every frame.
     pub maps: bool,
     pub progress: ProgressBar,
@@ -80,8 +82,7 @@ impl Session<'_> {
         fetch: impl Fn(usize) -> Fetched + Sync,
         mut look: impl FnMut(&Row) -> Result<()>,
     ) -> Result<Outcome> {
-        let mut pipeline = StereoMotion::new(self.rig, self.config.clone())?;
-        pipeline.set_mask(self.mask.clone());
+        let mut pipeline = Pipeline::new(self)?;
         let start = Instant::now();
         let mut tally = Tally::default();
         let mut rows: Vec<Row> = Vec::new();
@@ -91,21 +92,21 @@ impl Session<'_> {
         let mut album = Album::of(self.frames);
         with_frames(self.frames, stop, fetch, |frames| -> Result<()> {
             for fetched in frames {
-                let Fetched { index, time_s, pair, truth, decode_ms } = fetched;
+                let Fetched { index, time_s, frame, truth, decode_ms } = fetched;
                 truths.push(truth);
                 // Pictures show the maps over the image that they belong to.
                 let dense = self.config.observe == Observe::Dense;
-                let keep = pair.as_ref().ok().filter(|_| dense).map(|(left, _)| left.clone());
+                let keep = match &frame {
+                    Ok(Given::Frame(frame)) if dense => Some(frame.left.clone()),
+                    _ => None,
+                };
                 let writing = Instant::now();
-                if let (Ok((left, _)), false) = (&pair, dense) {
-                    let width_px = album.width_px(left.size());
-                    album.offer(|| FramePictures::of_image(index, rows.len() + 1, left, width_px));
+                if let (Ok(Given::Frame(frame)), false) = (&frame, dense) {
+                    let width_px = album.width_px(frame.left.size());
+                    album.offer(|| FramePictures::of_image(index, rows.len() + 1, &frame.left, width_px));
                 }
                 tally.aside_ms += writing.elapsed().as_secs_f64() * 1e3;
-                let motion = match pair {
-                    Ok((left, right)) => pipeline.push(StereoFrame { time_s, left, right }),
-                    Err(why) => pipeline.skip(time_s, why),
-                };
+                let motion = pipeline.push(time_s, frame);
                 if let Err(why) = &motion.motion
                     && *why != Unanswered::First
                 {
@@ -166,6 +167,45 @@ impl Session<'_> {
             wall_s: wall_ms / 1e3,
         })
     }
+}
+
+/// What turns frames of either kind into motion.
+enum Pipeline {
+    Images(Box<StereoMotion>),
+    Tracks(Box<TrackMotion>),
+}
+
+impl Pipeline {
+    fn new(session: &Session<'_>) -> Result<Self> {
+        let config = session.config.clone();
+        if session.tracks {
+            return Ok(Self::Tracks(Box::new(TrackMotion::new(session.rig, config)?)));
+        }
+        let mut images = StereoMotion::new(session.rig, config)?;
+        images.set_mask(session.mask.clone());
+        Ok(Self::Images(Box::new(images)))
+    }
+
+    fn push(&mut self, time_s: f64, given: Result<Given, Unanswered>) -> FrameMotion {
+        match (self, given) {
+            (Self::Images(images), Ok(Given::Frame(frame))) => images.push(frame),
+            (Self::Tracks(tracks), Ok(Given::Tracks(points))) => tracks.push(time_s, &points),
+            (Self::Images(images), given) => images.skip(time_s, reason(given)),
+            (Self::Tracks(tracks), given) => tracks.skip(time_s, reason(given)),
+        }
+    }
+
+    fn reference(&self) -> Option<usize> {
+        match self {
+            Self::Images(images) => images.reference(),
+            Self::Tracks(tracks) => tracks.reference(),
+        }
+    }
+}
+
+/// Why nothing can be pushed.
+fn reason(given: Result<Given, Unanswered>) -> Unanswered {
+    given.err().unwrap_or_else(|| Unanswered::BadImage("images and tracks are mixed".into()))
 }
 
 /// φ of the scene between two true camera poses.

@@ -17,18 +17,24 @@
 #![deny(missing_docs)]
 
 pub mod calibration;
+pub mod depth;
 pub mod disparity_png;
 pub mod error;
 pub mod flo;
 pub mod flow_png;
+pub mod given;
 pub mod image;
+pub mod lens;
 pub mod motion_table;
+pub mod npy;
+pub mod npz;
 pub mod pfm;
 pub mod ply;
 mod raster;
 pub mod read;
 pub mod source;
 pub mod stream;
+pub mod tracks;
 pub mod trajectory;
 pub mod write;
 

@@ -1,19 +1,25 @@
 //! What a SOURCE folder holds: its layout, frames, time stamps, rig and truth.
 
 mod euroc;
+mod feature_tracks;
 mod karlsruhe;
 mod kitti_odometry;
 mod kitti_raw;
 mod kitti_scenes;
 mod listing;
+mod moments;
 mod stamped_poses;
+mod tartanair;
+mod tum_rgbd;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use egomotion::geometry::{RigidMotion, StereoRectification, StereoRig};
+use egomotion::pipeline::rgbd::DepthNoise;
 
 use crate::IoError;
+use crate::lens::Lens;
 
 /// A recognised recording: one sequence, or a set of independent scenes.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +53,27 @@ pub enum Layout {
     TumVi,
     /// `image_0`, `image_1`, `calib.txt` and `insdata.txt`.
     Karlsruhe,
+    /// TUM's RGB-D set: `rgb.txt`, `depth.txt`, perhaps `groundtruth.txt`.
+    TumRgbd,
+    /// A trajectory of TartanAir 1: `image_left`, `depth_left`, perhaps `image_right` and `pose_left.txt`.
+    TartanAirV1,
+    /// A trajectory of TartanAir 2: `image_lcam_front`, `depth_lcam_front`, perhaps `image_rcam_front`.
+    TartanAirV2,
+    /// Stereo tracks with their rig in an `.npz`, and no images.
+    FeatureTracks,
+}
+
+/// The depth camera of a sequence, whose depth images lie on the left image's pixels.
+///
+/// [`Sequence::rig`] is then its rig: where it has no second camera, one with a virtual baseline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthSensor {
+    /// How noisy its depth is.
+    pub noise: DepthNoise,
+    /// Scale of 16-bit depth images, in levels per metre.
+    pub levels_per_m: f64,
+    /// Distortion of both images, which are warped by it when fetched.
+    pub lens: Option<Lens>,
 }
 
 /// Consecutive stereo pairs of one rig.
@@ -63,8 +90,28 @@ pub struct Sequence {
     pub rig: Option<StereoRig>,
     /// How the images are rectified to that rig; `None` where they are.
     pub rectification: Option<StereoRectification>,
+    /// What took the depth images; `None` where the layout has none.
+    pub depth_sensor: Option<DepthSensor>,
+    /// File of stereo tracks in place of images, for [`crate::tracks`].
+    pub tracks: Option<PathBuf>,
     /// True maps, where the layout has them.
     pub truth_maps: Option<TruthMaps>,
+}
+
+impl Sequence {
+    /// Frames of a rig, and nothing else known.
+    pub(crate) fn new(name: String, frames: Vec<FrameFiles>, clock: Clock, rig: Option<StereoRig>) -> Self {
+        Self {
+            name,
+            frames,
+            clock,
+            rig,
+            rectification: None,
+            depth_sensor: None,
+            tracks: None,
+            truth_maps: None,
+        }
+    }
 }
 
 /// The files of one frame.
@@ -77,6 +124,8 @@ pub struct FrameFiles {
     pub left: PathBuf,
     /// Right image; `None` if it is missing.
     pub right: Option<PathBuf>,
+    /// Depth image on the left image's pixels, a file for [`crate::depth`]; `None` if there is none.
+    pub depth: Option<PathBuf>,
     /// Time stamp, in seconds; strictly increasing.
     pub time_s: f64,
     /// True pose of the left camera, `world_from_camera`, if known.
@@ -112,7 +161,9 @@ pub struct TruthMaps {
 /// The layouts for error messages.
 const KNOWN: &str = "known layouts: KITTI odometry (image_0, image_1 or image_2, image_3, and calib.txt), \
                      KITTI 2012 and 2015 scenes (training/ with image_0, image_1 or image_2, image_3), \
-                     EuRoC and TUM-VI (mav0/cam0, mav0/cam1)";
+                     EuRoC and TUM-VI (mav0/cam0, mav0/cam1), \
+                     TUM RGB-D (rgb.txt, depth.txt), TartanAir (image_lcam_front or image_left), \
+                     stereo tracks (one .npz with features, K, b)";
 
 /// Interval of the KITTI cameras, assumed where there are no time stamps, in seconds.
 const KITTI_INTERVAL_S: f64 = 0.1;
@@ -133,6 +184,11 @@ impl Source {
     /// As [`Source::open`]; and what is wrong with the calibration file.
     pub fn open_with(path: &Path, calibration: Option<&Path>) -> Result<Self, IoError> {
         let folder = path.canonicalize().map_err(|error| IoError::system(path, "open", &error))?;
+        if let (true, Some((layout, reason, sequences))) =
+            (folder.is_file(), feature_tracks::recognise(&folder, calibration)?)
+        {
+            return Ok(Self { path: path.to_owned(), layout, reason, sequences });
+        }
         if !folder.is_dir() {
             return Err(IoError::new(
                 path,
@@ -140,23 +196,22 @@ impl Source {
                 format_args!("give a sequence folder; {KNOWN}"),
             ));
         }
-        let recognised = kitti_scenes::recognise(&folder, calibration)?;
-        let recognised = match recognised {
-            Some(found) => Some(found),
-            None => euroc::recognise(&folder, calibration)?,
-        };
-        let recognised = match recognised {
-            Some(found) => Some(found),
-            None => karlsruhe::recognise(&folder, calibration)?,
-        };
-        let recognised = match recognised {
-            Some(found) => Some(found),
-            None => kitti_odometry::recognise(&folder, calibration)?,
-        };
-        let recognised = match recognised {
-            Some(found) => Some(found),
-            None => kitti_raw::recognise(&folder, calibration)?,
-        };
+        let mut recognised = None;
+        for layout in [
+            kitti_scenes::recognise,
+            euroc::recognise,
+            karlsruhe::recognise,
+            kitti_odometry::recognise,
+            kitti_raw::recognise,
+            tum_rgbd::recognise,
+            tartanair::recognise,
+            feature_tracks::recognise,
+        ] {
+            recognised = layout(&folder, calibration)?;
+            if recognised.is_some() {
+                break;
+            }
+        }
         let (layout, reason, sequences) = recognised.ok_or_else(|| unknown(path, &folder))?;
         Ok(Self { path: path.to_owned(), layout, reason, sequences })
     }
@@ -188,6 +243,10 @@ impl fmt::Display for Layout {
             Self::Euroc => "EuRoC",
             Self::TumVi => "TUM-VI",
             Self::Karlsruhe => "Karlsruhe",
+            Self::TumRgbd => "TUM RGB-D",
+            Self::TartanAirV1 => "TartanAir 1",
+            Self::TartanAirV2 => "TartanAir 2",
+            Self::FeatureTracks => "stereo tracks",
         })
     }
 }

@@ -22,6 +22,8 @@ pub struct Pose {
 pub enum Format {
     /// `timestamp tx ty tz qx qy qz qw`: 8 numbers a row.
     Tum,
+    /// `tx ty tz qx qy qz qw`: 7 numbers a row.
+    TumWithoutTime,
     /// The upper 3×4 of the pose matrix, row by row: 12 numbers a row.
     Kitti,
     /// `nanoseconds, tx, ty, tz, qw, qx, qy, qz, …`: at least 8 numbers between commas.
@@ -49,6 +51,7 @@ pub fn read(path: &Path, format: Option<Format>) -> Result<Vec<Pose>, IoError> {
 pub fn parse(text: &str, format: Option<Format>, path: &Path) -> Result<Vec<Pose>, IoError> {
     let (shape, advice) = match format {
         Some(Format::Tum) => ("8", "give `timestamp tx ty tz qx qy qz qw`"),
+        Some(Format::TumWithoutTime) => ("7", "give `tx ty tz qx qy qz qw`"),
         Some(Format::Kitti) => ("12", "give the 12 numbers of a 3x4 matrix"),
         Some(Format::Euroc) => ("8 or more", "give `nanoseconds, tx, ty, tz, qw, qx, qy, qz`"),
         None => ("8 or 12", "give TUM rows (8 numbers), KITTI rows (12 numbers) or EuRoC's CSV"),
@@ -60,6 +63,9 @@ pub fn parse(text: &str, format: Option<Format>, path: &Path) -> Result<Vec<Pose
         let row = read::numbers(line)?;
         match (format, row.len()) {
             (None | Some(Format::Tum), 8) => tum_pose(&row),
+            (Some(Format::TumWithoutTime), 7) => {
+                Ok(Pose { time_s: None, ..tum_pose(&[&[0.0], row.as_slice()].concat())? })
+            }
             (None | Some(Format::Kitti), 12) => kitti_pose(&row),
             (_, n) => Err(format!("the row has {n} numbers, not {shape}")),
         }

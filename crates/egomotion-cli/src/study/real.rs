@@ -55,7 +55,7 @@ struct RecordingStudy {
     #[serde(skip)]
     frames: Vec<(FrameFiles, RigidMotion)>,
     #[serde(skip)]
-    reader: Reader,
+    reader: Reader<'static>,
 }
 
 impl RecordingStudy {
@@ -69,7 +69,7 @@ impl RecordingStudy {
         }
         let sequence =
             source.sequences.into_iter().next().with_context(|| format!("{name}: has no frames"))?;
-        let reader = Reader::new(&sequence);
+        let reader = Reader::new(&sequence, false);
         let Some(rig) = sequence.rig else {
             bail!("{name}: has no calibration; give one with --calibration FILE");
         };

@@ -39,13 +39,10 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
     };
     add_truth(&mut frames, (&top, &mav), body_from_left, pair.rectification.as_ref())?;
     let name = top.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let frames = frames.into_iter().map(|(_, frame)| frame).collect();
     let sequence = Sequence {
-        name,
-        frames: frames.into_iter().map(|(_, frame)| frame).collect(),
-        clock: Clock::Measured,
-        rig: Some(pair.rig),
         rectification: pair.rectification,
-        truth_maps: None,
+        ..Sequence::new(name, frames, Clock::Measured, Some(pair.rig))
     };
     let fisheye = sequence.rectification.as_ref().is_some_and(|pair| {
         [pair.left(), pair.right()].iter().all(|c| matches!(c.distortion(), Distortion::Equidistant { .. }))
@@ -117,7 +114,7 @@ fn together(left_data: &Path, left: &Images, right: &Images) -> Vec<(i64, FrameF
         // A lost left image has the name that its time gives.
         let lost = || left_data.join(format!("{stamp}.png"));
         let left = left.get(&stamp).cloned().unwrap_or_else(lost);
-        (stamp, FrameFiles { index, left, right, time_s: stamp as f64 * 1e-9, truth: None })
+        (stamp, FrameFiles { index, left, right, depth: None, time_s: stamp as f64 * 1e-9, truth: None })
     };
     stamps.into_iter().enumerate().map(frame).collect()
 }

@@ -46,12 +46,8 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
     let reason = format!("it holds image_{l} and image_{r} with numbered PNG files");
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let sequence = Sequence {
-        name,
-        frames,
-        clock,
-        rig: Some(rectified.rig),
         rectification: rectified.rectification,
-        truth_maps: None,
+        ..Sequence::new(name, frames, clock, Some(rectified.rig))
     };
     Ok(Some((Layout::KittiOdometry, reason, vec![sequence])))
 }

@@ -36,14 +36,7 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
     let [l, r] = pair.cameras();
     let reason = format!("it holds image_{l:02}/data and image_{r:02}/data with numbered PNG files");
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let sequence = Sequence {
-        name,
-        frames,
-        clock: Clock::Measured,
-        rig: Some(rig),
-        rectification: None,
-        truth_maps: None,
-    };
+    let sequence = Sequence::new(name, frames, Clock::Measured, Some(rig));
     Ok(Some((Layout::KittiRaw, reason, vec![sequence])))
 }
 

@@ -111,12 +111,9 @@ impl Set {
         let truth_maps = self.truth(folder, &name);
         let clock = Clock::Assumed { interval_s: KITTI_INTERVAL_S };
         Ok(Sequence {
-            name,
-            frames,
-            clock,
-            rig: Some(pair.rig),
             rectification: pair.rectification,
             truth_maps,
+            ..Sequence::new(name, frames, clock, Some(pair.rig))
         })
     }
 

@@ -61,7 +61,7 @@ pub(super) fn pairs(
         let right = right.get(&index).cloned();
         let name = right.as_deref().and_then(Path::file_name).unwrap_or_default();
         let left = left.get(&index).cloned().unwrap_or_else(|| left_folder.join(name));
-        FrameFiles { index, left, right, time_s: 0.0, truth: None }
+        FrameFiles { index, left, right, depth: None, time_s: 0.0, truth: None }
     };
     indices.into_iter().map(frame).collect()
 }

@@ -2,9 +2,10 @@
 
 use nalgebra::Vector3;
 
+use super::disparity::GUESS_SIGMA_PX;
 use super::patch::{Freedom, Located, Patch, Settling};
 use super::stereo_pyramid::StereoPyramid;
-use super::tracks::{Expected, Hints, StereoCorner, Trace, TrackOptions};
+use super::tracks::{Across, Expected, Hints, StereoCorner, Trace, TrackOptions};
 use crate::geometry::{StereoRig, Twist};
 
 /// A place is found when a step is shorter than this, in pixels; steps shrink tenfold each.
@@ -22,6 +23,13 @@ pub(super) struct Follower<'a> {
     pub(super) expected: Expected,
 }
 
+/// Which of the two frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Time {
+    Earlier,
+    Later,
+}
+
 impl Follower<'_> {
     /// A corner of the earlier frame in the later one.
     pub(super) fn trace(&self, corner: &StereoCorner) -> Option<Trace> {
@@ -30,14 +38,16 @@ impl Follower<'_> {
         if self.hints.mask.is_some_and(|m| u < m.width() && v < m.height() && m.at(u, v)) {
             return None;
         }
-        let after = self.across(self.after, (next.u, next.v), corner.shift * scale, corner.age + 1)?;
+        let after =
+            self.across(self.after, Time::Later, (next.u, next.v), corner.shift * scale, corner.age + 1)?;
         Some(Trace { before: *corner, after, residual: next.residual })
     }
 
-    /// Left to right along the row, and back.
+    /// Left to right along the row, and back; or as the given map has it.
     pub(super) fn across(
         &self,
         frame: &StereoPyramid,
+        time: Time,
         (u, v): (f64, f64),
         shift: f64,
         age: u32,
@@ -45,6 +55,21 @@ impl Follower<'_> {
         let patch = Patch::new(&frame.left_spline, u, v)?;
         if patch.strength() < f64::from(self.options.least_strength) * WEAKENED {
             return None;
+        }
+        if let Some(given) = self.hints.given {
+            let reading = given[time as usize].read(u, v)?;
+            let across = Across::Read { variance: reading.variance, slope: reading.slope };
+            let known = reading.variance < f64::from(GUESS_SIGMA_PX).powi(2);
+            let positive = self.rig.disparity_from_shift(reading.shift) > 0.0;
+            let localisation = patch.localisation()?;
+            return (known && positive).then_some(StereoCorner {
+                u,
+                v,
+                shift: reading.shift,
+                age,
+                localisation,
+                across,
+            });
         }
         let found =
             patch.locate(&frame.right_spline, (u - shift, v), Freedom::Row, self.settling(SETTLED_PX))?;
@@ -61,7 +86,7 @@ impl Follower<'_> {
             shift,
             age,
             localisation,
-            residual: found.residual,
+            across: Across::Matched { residual: found.residual },
         })
     }
 

@@ -1,6 +1,7 @@
 //! From images to observations, each with its covariance.
 
 pub mod corners;
+mod depth_alignment;
 pub mod disparity;
 pub(crate) mod dispatch;
 pub mod flow;

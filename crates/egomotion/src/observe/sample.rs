@@ -21,6 +21,8 @@ pub struct DensePair<'a> {
     pub flow: &'a FlowField,
     /// Flow of the right camera from t to t′; only the differential binocular flow needs it.
     pub flow_right: Option<&'a FlowField>,
+    /// Whether disparity was given and not matched: its errors are then no part of those of places in the images.
+    pub given: bool,
 }
 
 impl DensePair<'_> {
@@ -81,6 +83,14 @@ impl DensePair<'_> {
         let mut before = self.before(u, v)?;
         let moved = self.displacement(u, v)?;
         let (x, y) = (before.mean.x + moved.mean.x, before.mean.y + moved.mean.y);
+        if self.given {
+            let (later, cross) = self.later(x, y, &moved.cov)?;
+            let mean = Vector3::new(x, y, later.value());
+            return Some(StereoTrack {
+                before,
+                after: Gaussian { mean, cov: joint(&moved.cov, cross, later.variance()) },
+            });
+        }
         let half = 0.5 * moved.cov;
         let own = Vector2::new(shared_variance(&half, before.cov[(2, 2)]), 0.0);
         before.cov = joint(&half, own, before.cov[(2, 2)]);
@@ -96,7 +106,8 @@ impl DensePair<'_> {
         let (d, variance) = self.disparity(u, v)?;
         let moved = self.displacement(u, v)?;
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
-        let (later, _) = self.later(x + moved.mean.x, y + moved.mean.y, &(0.5 * moved.cov))?;
+        let place = if self.given { moved.cov } else { 0.5 * moved.cov };
+        let (later, _) = self.later(x + moved.mean.x, y + moved.mean.y, &place)?;
         Some(Gaussian::independent([d, later.value()], [variance, later.variance()]))
     }
 
@@ -106,7 +117,8 @@ impl DensePair<'_> {
     #[inline(always)]
     fn later(&self, x: f64, y: f64, place: &Matrix2<f64>) -> Option<(Gaussian<1>, Vector2<f64>)> {
         let (later, gradient) = disparity_at(self.rig, self.after, x, y)?;
-        let own = Vector2::new(shared_variance(place, later.variance()), 0.0);
+        let shared = if self.given { 0.0 } else { shared_variance(place, later.variance()) };
+        let own = Vector2::new(shared, 0.0);
         let slope = place * gradient;
         let variance = later.variance() + gradient.dot(&slope) + 2.0 * own.dot(&gradient);
         Some((Gaussian::scalar(later.value(), variance), own + slope))
@@ -152,11 +164,12 @@ impl DensePair<'_> {
         Some(DepthFlow { x_px: x, y_px: y, disparity: Gaussian { mean, cov }, flow })
     }
 
-    /// Differential DV at the middle of the interval, from the flows of both cameras.
+    /// Differential DV at the middle of the interval, from the flows of both cameras; without the right one's,
+    /// from the change of disparity.
     pub fn stereo_flow(&self, u: usize, v: usize) -> Option<StereoFlow> {
+        let Some(right) = self.flow_right else { return Some(self.stereo_track(u, v)?.midpoint_flow()) };
         let before = self.before(u, v)?;
         let left = self.displacement(u, v)?;
-        let right = self.flow_right?;
         let at = u as f64 - self.rig.shift_from_disparity(before.mean.z);
         let right_x = right.u.sample(at, v as f64)?;
         let right_var = f64::from(right.cov_uu.at((at.round() as usize).min(right.size().0 - 1), v));
@@ -245,7 +258,14 @@ mod tests {
         flow.cov_uv = Grid::filled(width, height, 0.2499);
         flow.cov_vv = Grid::filled(width, height, 0.25);
         let rig = StereoRig::new(300.0, (5.5, 4.5), 0.1, (width, height)).unwrap();
-        let pair = DensePair { rig: &rig, before: &slanted, after: &slanted, flow: &flow, flow_right: None };
+        let pair = DensePair {
+            rig: &rig,
+            before: &slanted,
+            after: &slanted,
+            flow: &flow,
+            flow_right: None,
+            given: false,
+        };
         let tracks = pair.every(1, DensePair::stereo_track);
         assert!(tracks.len() > 40);
         for track in tracks {

@@ -8,14 +8,17 @@
 //! Where a corner was found, with its disparity, is where the next pair follows it from: it lives
 //! as long as it is found. Its window is taken anew in every frame. Nothing drifts, because a
 //! pair's motion is measured between two places of the same window, whatever corner it once was.
+//!
+//! Where disparity is given in place of a right image ([`Hints::given`]), it is read from the map.
 
 use documented::DocumentedFields;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::corners::{Cells, corners};
-use super::follow::Follower;
+use super::disparity::DisparityMap;
+use super::follow::{Follower, Time};
 use super::observation::StereoTrack;
 use super::patch::{self, Localisation};
 use super::row_search::search_row;
@@ -65,6 +68,8 @@ pub struct Hints<'a> {
     pub motion: Option<&'a Twist>,
     /// Pixels never to use, where `true`.
     pub mask: Option<&'a Grid<bool>>,
+    /// Disparity of the earlier and the later frame, which takes the place of their right images.
+    pub given: Option<[&'a DisparityMap; 2]>,
 }
 
 /// How far a corner may be from where it is expected.
@@ -89,8 +94,25 @@ pub struct StereoCorner {
     pub age: u32,
     /// How noise moves its place.
     pub(super) localisation: Localisation,
-    /// Mean squared difference of the left and the right window.
-    pub(super) residual: f64,
+    /// How its disparity was found.
+    pub(super) across: Across,
+}
+
+/// How the disparity of a corner was found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Across {
+    /// In the right image.
+    Matched {
+        /// Mean squared difference of the left and the right window.
+        residual: f64,
+    },
+    /// In a given map.
+    Read {
+        /// Variance of the disparity, in px².
+        variance: f64,
+        /// Its change per pixel in u and in v.
+        slope: (f64, f64),
+    },
 }
 
 /// A corner in two frames.
@@ -134,9 +156,10 @@ pub fn stereo_corners(
     let locate = |corner: &super::corners::Corner| {
         let shift = match hints.shift {
             Some(field) => f64::from(field.get(corner.u, corner.v)?),
+            None if hints.given.is_some() => 0.0,
             None => search_row(frame, corner.u, corner.v, options.largest_disparity_px)?,
         };
-        follower.across(frame, (corner.u as f64, corner.v as f64), shift, 0)
+        follower.across(frame, Time::Earlier, (corner.u as f64, corner.v as f64), shift, 0)
     };
     let new: Vec<Option<StereoCorner>> = found.par_iter().map(locate).collect();
     all.extend(new.into_iter().flatten());
@@ -193,7 +216,9 @@ impl GreyNoise {
     fn of(traces: &[Trace]) -> Self {
         Self {
             time: median(traces.iter().map(Trace::grey_variance).collect()),
-            rig: median(traces.iter().flat_map(|t| [t.before, t.after]).map(|c| c.grey_variance()).collect()),
+            rig: median(
+                traces.iter().flat_map(|t| [t.before, t.after]).filter_map(|c| c.grey_variance()).collect(),
+            ),
         }
     }
 }
@@ -221,7 +246,8 @@ impl Trace {
     fn track(&self, rig: &StereoRig, noise: GreyNoise) -> Option<StereoTrack> {
         let time = at_least(noise.time, self.grey_variance());
         let end = |corner: &StereoCorner| {
-            corner.measured(rig, GreyNoise { time, rig: at_least(noise.rig, corner.grey_variance()) })
+            let rig_noise = corner.grey_variance().map_or(noise.rig, |own| at_least(noise.rig, own));
+            corner.measured(rig, GreyNoise { time, rig: rig_noise })
         };
         let (before, after) = (end(&self.before), end(&self.after));
         (before.mean.z > 0.0 && after.mean.z > 0.0).then_some(StereoTrack { before, after })
@@ -230,22 +256,37 @@ impl Trace {
 
 impl StereoCorner {
     /// Variance of a grey level from the left and the right window.
-    fn grey_variance(&self) -> f64 {
-        0.5 * self.residual / self.localisation.left_over
+    fn grey_variance(&self) -> Option<f64> {
+        match self.across {
+            Across::Matched { residual } => Some(0.5 * residual / self.localisation.left_over),
+            Across::Read { .. } => None,
+        }
     }
 
     /// (x, y, d) given the variances of grey levels.
     fn measured(&self, rig: &StereoRig, noise: GreyNoise) -> Gaussian<3> {
         let (x, y) = rig.image_from_pixel(self.u, self.v);
         let Localisation { plane, plane_row, row, .. } = &self.localisation;
-        let (ratio, both) = (rig.aspect(), noise.time.min(noise.rig));
-        let xd = plane_row.x * both;
-        let plane = plane * noise.time;
-        let (xx, xy, yy) = (plane.m11, plane.m12 * ratio, plane.m22 * ratio * ratio);
-        // d is located along the row alone, from the same noise of the left window as x and y; the
-        // right window adds as much again.
-        let yd = plane_row.y * both * ratio;
-        let cov = Matrix3::new(xx, xy, xd, xy, yy, yd, xd, yd, 2.0 * row * noise.rig);
+        let ratio = rig.aspect();
+        let place = plane * noise.time;
+        let place = Matrix2::new(place.m11, place.m12 * ratio, place.m12 * ratio, place.m22 * ratio * ratio);
+        let (cross, variance) = match self.across {
+            // d is located along the row alone, from the same noise of the left window as x and y; the
+            // right window adds as much again.
+            Across::Matched { .. } => {
+                let both = noise.time.min(noise.rig);
+                let cross = Vector2::new(plane_row.x * both, plane_row.y * both * ratio);
+                (cross, 2.0 * row * noise.rig)
+            }
+            // d is read where the window was found, so an error of the place moves it along the map's slope.
+            Across::Read { variance, slope } => {
+                let slope = Vector2::new(slope.0, slope.1 / ratio);
+                let cross = place * slope;
+                (cross, variance + slope.dot(&cross))
+            }
+        };
+        let (xx, xy, yy) = (place.m11, place.m12, place.m22);
+        let cov = Matrix3::new(xx, xy, cross.x, xy, yy, cross.y, cross.x, cross.y, variance);
         Gaussian { mean: Vector3::new(x, y, rig.disparity_from_shift(self.shift)), cov }
     }
 }

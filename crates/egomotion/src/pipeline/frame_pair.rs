@@ -3,30 +3,21 @@
 use std::time::Instant;
 
 use super::config::{Approach, Config, Method, Observe};
-use super::contested::scene_motion;
 use super::groups::{Groups, MovingGroup};
-use super::maps::{MotionMaps, motion_maps, track_sightings};
+use super::maps::{MotionMaps, motion_maps};
 use super::moving::Moving;
+use super::shape::solve_with_shape;
 use super::solve::{Observed, solve};
-use super::stereo::{StageTimes, Unanswered};
-use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
-use crate::estimate::robust_start::robust_start;
-use crate::estimate::systematic::common_errors;
+use super::stereo::StageTimes;
+use super::track_solver::TrackSolver;
+use super::unanswered::Unanswered;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Grid, StereoRig, Twist};
-use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
 use crate::motion::obstacle::{Belief, NoObstacle, Obstacle, nearest};
 use crate::observe::flow::{Camera, FlowPair, FlowSpace, rigid_flow};
 use crate::observe::row_disagreement::row_disagreement;
 use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};
 use crate::observe::{DensePair, DisparityMap, FlowField, FlowOptions, StereoPyramid, StereoTrack};
-
-/// Standard deviation of an offset of disparity per pixel by which rows disagree.
-///
-/// Rows show only the vertical part of a wrong calibration; yaw, focal lengths and distortion act
-/// along rows as well. On the four KITTI scenes with laser truth the horizontal offset is 0.6 to 3.1
-/// times the vertical one; this is the cautious end.
-const OFFSET_PER_ROW_DISAGREEMENT: f64 = 3.0;
 
 /// A frame that later ones are matched with.
 #[derive(Debug)]
@@ -35,6 +26,8 @@ pub(super) struct Reference {
     pub(super) time_s: f64,
     pub(super) images: StereoPyramid,
     pub(super) disparity: Option<DisparityMap>,
+    /// Given flow to the next frame.
+    pub(super) flow: Option<FlowField>,
     /// Corners that were followed here from the frame before.
     pub(super) corners: Vec<StereoCorner>,
 }
@@ -86,10 +79,14 @@ impl FramePair<'_> {
         let prior = velocity.map(|v| v.scaled(self.dt_s()));
         let Tracked { tracks, rough, corners } = timed(&mut stages.tracks_ms, || self.tracks(prior.as_ref()));
         let result = match self.config.observe {
-            Observe::Sparse => self.sparse(&tracks, rough, stages),
+            Observe::Sparse => {
+                let rows = row_disagreement(&self.before.images, &tracks, self.rig);
+                self.solver().sparse(&tracks, rough, rows, stages)
+            }
             Observe::Dense => {
-                let refined =
-                    timed(&mut stages.tracks_ms, || rough.and_then(|rough| self.refined(&tracks, &rough)));
+                let refined = timed(&mut stages.tracks_ms, || {
+                    rough.and_then(|rough| self.solver().refined(&tracks, &rough))
+                });
                 self.dense(&tracks, refined, space, stages)
             }
         };
@@ -114,7 +111,7 @@ impl FramePair<'_> {
                 found = free;
             }
         }
-        let rough = self.rough(&measured(&found, self.rig), prior);
+        let rough = self.solver().rough(&measured(&found, self.rig), prior);
         let traces = match &rough {
             Ok(rough) => self.follow(&corners, Some(rough), Expected::Near),
             Err(_) => Vec::new(),
@@ -133,50 +130,14 @@ impl FramePair<'_> {
 
     fn hints<'b>(&'b self, motion: Option<&'b Twist>) -> Hints<'b> {
         let shift = self.before.disparity.as_ref().map(|d| &d.shift);
-        Hints { shift, motion, mask: self.mask }
+        let maps = self.before.disparity.as_ref().zip(self.after.disparity.as_ref());
+        let both_right = self.before.images.has_right() && self.after.images.has_right();
+        let given = maps.filter(|_| !both_right).map(|(before, after)| [before, after]);
+        Hints { shift, motion, mask: self.mask, given }
     }
 
-    /// The motion of most tracks, or of those that go on as before where a body holds most.
-    fn rough(&self, tracks: &[StereoTrack], prior: Option<&Twist>) -> Result<Twist, Unsolvable> {
-        let own = &self.config.maximum_likelihood;
-        let options = &MaximumLikelihoodOptions { seed: own.seed ^ self.config.seed, ..*own };
-        let of_most = |tracks: &[StereoTrack]| {
-            let start = robust_start(tracks, self.rig, prior, options)?;
-            self.refined(tracks, &start)
-        };
-        let found = of_most(tracks)?;
-        Ok(prior.map_or(found, |prior| scene_motion(tracks, self.rig, found, prior, of_most)))
-    }
-
-    fn refined(&self, tracks: &[StereoTrack], start: &Twist) -> Result<Twist, Unsolvable> {
-        let kernel = &self.config.maximum_likelihood.kernel;
-        Ok(maximum_likelihood(tracks, self.rig, start, None, kernel)?.motion.phi())
-    }
-
-    fn sparse(
-        &self,
-        tracks: &[StereoTrack],
-        rough: Result<Twist, Unsolvable>,
-        stages: &mut StageTimes,
-    ) -> PairResult {
-        let motion = timed(&mut stages.estimate_ms, || {
-            solve(&Observed::Sparse(tracks), self.rig, &rough?, self.config)
-        });
-        let rows = row_disagreement(&self.before.images, tracks, self.rig);
-        let rigid = self.rigid(tracks, motion.as_ref().ok(), rows);
-        let obstacle = rigid.ok_or(NoObstacle::NothingMeasured).and_then(|rigid| {
-            let mut seen = track_sightings(tracks, &rigid, self.rig, self.config, self.dt_s());
-            nearest(&mut seen, (self.rig.width_px, self.rig.height_px), &Belief::SPARSE)
-        });
-        PairResult {
-            motion: motion.map_err(Unanswered::from),
-            row_disagreement_px: rows,
-            obstacle,
-            moving: Vec::new(),
-            flow: None,
-            maps: None,
-            corners: Vec::new(),
-        }
+    fn solver(&self) -> TrackSolver<'_> {
+        TrackSolver { rig: self.rig, config: self.config, dt_s: self.dt_s() }
     }
 
     fn dense(
@@ -201,25 +162,43 @@ impl FramePair<'_> {
         let differential = self.config.approach == Approach::Differential;
         let both = differential && matches!(self.config.method, Method::Dv | Method::Joint | Method::Ml);
         let prediction = rough.as_ref().ok();
+        let given = self.before.flow.as_ref().filter(|_| self.after.frame == self.before.frame + 1);
         let (flow, right) = timed(&mut stages.flow_ms, || {
-            let left = self.flow(Camera::Left, before, prediction, space);
+            let left = match given {
+                Some(given) => Some(given.clone()),
+                None => self.flow(Camera::Left, before, prediction, space),
+            };
+            let both = both && self.before.images.has_right() && self.after.images.has_right();
             let right = both.then(|| self.flow(Camera::Right, before, prediction, space));
             (left, right.flatten())
         });
         let Some(flow) = flow else {
             return nothing(Unanswered::Unsolvable(Unsolvable::FewRows { rows: 0, needed: 6 }));
         };
-        let pair = DensePair { rig: self.rig, before, after, flow: &flow, flow_right: right.as_ref() };
-        let start = rough.unwrap_or_else(|_| Twist::zero());
+        let shaped = self.hints(None).given.is_some();
+        let pair = DensePair {
+            rig: self.rig,
+            before,
+            after,
+            flow: &flow,
+            flow_right: right.as_ref(),
+            given: shaped,
+        };
+        let by_shape =
+            shaped && (self.config.method, self.config.approach) == (Method::Ml, Approach::Discrete);
         let motion = timed(&mut stages.estimate_ms, || {
+            if by_shape {
+                return solve_with_shape(&pair, tracks, rough.as_ref().ok(), self.config)?.known();
+            }
+            let start = rough.unwrap_or_else(|_| Twist::zero());
             solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config)
         });
         let rows = row_disagreement(&self.before.images, tracks, self.rig);
         let (maps, obstacle, moving) = timed(&mut stages.maps_ms, || {
-            let rigid = self.rigid(tracks, motion.as_ref().ok(), rows);
+            let rigid = self.solver().rigid(tracks, motion.as_ref().ok(), rows);
             let groups = rigid.as_ref().zip(motion.as_ref().ok()).map(|(rigid, still)| {
                 let moving = Moving::find(&pair, (&self.before.images, &self.after.images), rigid);
-                let predict = |tracks: &[_], motion: &_| self.rigid(tracks, Some(motion), rows);
+                let predict = |tracks: &[_], motion: &_| self.solver().rigid(tracks, Some(motion), rows);
                 Groups::find(&pair, moving, self.config, still, self.dt_s(), predict)
             });
             let (maps, mut seen) =
@@ -239,26 +218,6 @@ impl FramePair<'_> {
             flow: Some(flow),
             corners: Vec::new(),
         }
-    }
-
-    /// What every pixel would do as part of the still world.
-    ///
-    /// How φ answers to a wrong calibration is taken from maximum likelihood on the tracks, whatever
-    /// the method that found φ.
-    fn rigid(
-        &self,
-        tracks: &[StereoTrack],
-        motion: Option<&MotionEstimate>,
-        row_disagreement_px: Option<f64>,
-    ) -> Option<RigidPrediction<'_>> {
-        let motion = motion?;
-        let kernel = &self.config.maximum_likelihood.kernel;
-        let common = common_errors(tracks, self.rig, &motion.phi(), kernel);
-        let offset = common.map_or_else(DisparityOffset::none, |common| DisparityOffset {
-            sigma_px: OFFSET_PER_ROW_DISAGREEMENT * row_disagreement_px.unwrap_or(0.0),
-            phi_per_px: common.by_disparity_offset,
-        });
-        RigidPrediction::new(&motion.theta, offset, self.rig)
     }
 
     /// Flow of one camera; what is not measured but predicted counts for the left one only, for the right

@@ -1,63 +1,18 @@
-//! Stereo frames in, motion out: keeps what one frame needs of the ones before.
+//! Frames in, motion out: keeps what one frame needs of the ones before.
 
 use thiserror::Error;
 
 use super::config::{Config, ConfigError, Observe};
+use super::frame::{Frame, erase};
 use super::frame_pair::{FramePair, Reference, timed};
 use super::groups::MovingGroup;
 use super::maps::MotionMaps;
-use crate::estimate::{MotionEstimate, Unsolvable};
-use crate::geometry::{Field, Grid, Image, RigError, StereoRig, Twist};
+use super::unanswered::Unanswered;
+use crate::estimate::MotionEstimate;
+use crate::geometry::{Grid, RigError, StereoRig, Twist};
 use crate::motion::{NoObstacle, Obstacle, TimeToImpact};
 use crate::observe::flow::FlowSpace;
 use crate::observe::{DisparityMap, DisparityMatcher, FlowField, StereoPyramid};
-
-/// A rectified pair of images of one time.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StereoFrame {
-    /// Time in seconds; it must increase from frame to frame.
-    pub time_s: f64,
-    /// Left image, of the rig's size.
-    pub left: Image,
-    /// Right image, of the rig's size.
-    pub right: Image,
-}
-
-/// Why there is no answer for a frame.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum Unanswered {
-    /// There is no earlier frame to compare with.
-    #[error("no earlier frame")]
-    First,
-    /// The images cannot be used.
-    #[error("{0}")]
-    BadImage(String),
-    /// The right image is missing.
-    #[error("the right image is missing")]
-    MissingRight,
-    /// The time stamp does not lie after that of the frame before.
-    #[error("the time stamp does not increase")]
-    BadTime,
-    /// The images gave no solvable equations.
-    #[error(transparent)]
-    Unsolvable(#[from] Unsolvable),
-}
-
-impl Unanswered {
-    /// One word for tables.
-    pub fn code(&self) -> &'static str {
-        match self {
-            Self::First => "first",
-            Self::BadImage(_) => "bad_image",
-            Self::MissingRight => "missing_right",
-            Self::BadTime => "bad_time",
-            Self::Unsolvable(Unsolvable::FewRows { .. }) => "few_rows",
-            Self::Unsolvable(Unsolvable::Unobservable) => "unobservable",
-            Self::Unsolvable(Unsolvable::NotFinite) => "not_finite",
-            Self::Unsolvable(Unsolvable::NotConverged) => "not_converged",
-        }
-    }
-}
 
 /// Milliseconds spent in each stage of one frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -155,9 +110,6 @@ pub struct StereoMotion {
 /// After this many good frames without an answer the reference itself is given up.
 const MOST_FAILURES: usize = 2;
 
-/// Least standard deviation of the grey levels of a usable image.
-const LEAST_CONTRAST: f64 = 1.0;
-
 impl StereoMotion {
     /// A pipeline for one rig.
     ///
@@ -215,37 +167,25 @@ impl StereoMotion {
     }
 
     /// The motion from the last good frame to this one.
-    pub fn push(&mut self, frame: StereoFrame) -> FrameMotion {
+    pub fn push(&mut self, frame: impl Into<Frame>) -> FrameMotion {
+        let frame = frame.into();
         if let Err(why) = self.usable(&frame) {
             return self.skip(frame.time_s, why);
         }
         self.last_time_s = Some(frame.time_s);
         let mut stages = StageTimes::default();
         let images = timed(&mut stages.pyramids_ms, || {
-            let levels = self.config.tracks.pyramid_levels;
-            match self.spare.take() {
-                Some(mut spare) => {
-                    spare.renew(&frame.left, &frame.right, levels);
-                    spare
-                }
-                None => StereoPyramid::new(&frame.left, &frame.right, levels),
-            }
+            let mut images = self.spare.take().unwrap_or_default();
+            images.renew(&frame.left, frame.right.as_ref(), self.config.tracks.pyramid_levels);
+            images
         });
-        let disparity = (self.config.observe == Observe::Dense).then(|| {
-            timed(&mut stages.disparity_ms, || {
-                let (left, right) = (&images.left.levels()[0], &images.right.levels()[0]);
-                let mut map = self.matcher.compute(left, right).ok()?;
-                if let Some(mask) = &self.mask {
-                    erase(&mut map.shift, mask);
-                }
-                Some(map)
-            })
-        });
+        let matched = timed(&mut stages.disparity_ms, || self.disparity(frame.disparity, &images));
         let here = Reference {
             frame: self.frames,
             time_s: frame.time_s,
             images,
-            disparity: disparity.flatten(),
+            disparity: matched,
+            flow: frame.flow,
             corners: Vec::new(),
         };
         let Some(mut before) = self.reference.take() else {
@@ -253,6 +193,11 @@ impl StereoMotion {
             self.reference = Some(here);
             return first;
         };
+        if here.images.repeats(&before.images) {
+            let repeated = self.skip(here.time_s, Unanswered::RepeatedFrame);
+            (self.reference, self.spare) = (Some(before), Some(here.images));
+            return repeated;
+        }
         let mask = self.mask.as_ref();
         let pair = FramePair { before: &before, after: &here, rig: &self.rig, config: &self.config, mask };
         let result = pair.motion(self.velocity.as_ref(), &mut self.flow_space, &mut stages);
@@ -280,23 +225,23 @@ impl StereoMotion {
         answer
     }
 
-    fn usable(&self, frame: &StereoFrame) -> Result<(), Unanswered> {
-        let expected = (self.rig.width_px, self.rig.height_px);
-        for (side, image) in [("left", &frame.left), ("right", &frame.right)] {
-            if image.size() != expected {
-                let ((w, h), (we, he)) = (image.size(), expected);
-                return Err(Unanswered::BadImage(format!("the {side} image is {w}x{h}, the rig {we}x{he}")));
+    /// The given disparity, or that of the images when observing densely, without what is masked.
+    fn disparity(&mut self, given: Option<DisparityMap>, images: &StereoPyramid) -> Option<DisparityMap> {
+        let mut map = match (given, self.config.observe) {
+            (Some(given), _) => given,
+            (None, Observe::Sparse) => return None,
+            (None, Observe::Dense) => {
+                self.matcher.compute(images.left.levels().first()?, images.right.levels().first()?).ok()?
             }
-            let contrast = contrast(image);
-            if contrast.is_nan() {
-                return Err(Unanswered::BadImage(format!(
-                    "the {side} image has values that are not numbers"
-                )));
-            }
-            if contrast < LEAST_CONTRAST {
-                return Err(Unanswered::BadImage(format!("the {side} image is constant")));
-            }
+        };
+        if let Some(mask) = &self.mask {
+            erase(&mut map.shift, mask);
         }
+        Some(map)
+    }
+
+    fn usable(&self, frame: &Frame) -> Result<(), Unanswered> {
+        frame.check(&self.rig)?;
         let increases = self.last_time_s.is_none_or(|last| frame.time_s > last);
         if increases && frame.time_s.is_finite() { Ok(()) } else { Err(Unanswered::BadTime) }
     }
@@ -313,39 +258,5 @@ impl StereoMotion {
         let (kept, gone) = if keep_old { (before, here) } else { (here, before) };
         self.reference = Some(kept);
         self.spare = Some(gone.images);
-    }
-}
-
-/// Standard deviation of the grey levels; NaN if one of them is not a number.
-fn contrast(image: &Image) -> f64 {
-    const LANES: usize = 8;
-    let n = image.values().len().max(1) as f64;
-    // Differences from one grey level: squares of the levels themselves would cancel.
-    let level = f64::from(image.values().first().copied().unwrap_or(0.0));
-    let (mut sums, mut squares) = ([0.0; LANES], [0.0; LANES]);
-    let (chunks, rest) = image.values().as_chunks::<LANES>();
-    for chunk in chunks {
-        for i in 0..LANES {
-            let x = f64::from(chunk[i]) - level;
-            sums[i] += x;
-            squares[i] += x * x;
-        }
-    }
-    let rest = rest.iter().map(|&v| f64::from(v) - level);
-    let mean = (sums.iter().sum::<f64>() + rest.clone().sum::<f64>()) / n;
-    let square = (squares.iter().sum::<f64>() + rest.map(|x| x * x).sum::<f64>()) / n;
-    let variance = square - mean * mean;
-    // Rounding may make it negative, and comparisons must let NaN through.
-    if variance < 0.0 { 0.0 } else { variance.sqrt() }
-}
-
-/// Clear the pixels that the mask excludes.
-fn erase(field: &mut Field, mask: &Grid<bool>) {
-    for v in 0..field.height().min(mask.height()) {
-        for (value, &masked) in field.row_mut(v).iter_mut().zip(mask.row(v)) {
-            if masked {
-                *value = f32::NAN;
-            }
-        }
     }
 }

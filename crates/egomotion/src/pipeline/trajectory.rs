@@ -1,6 +1,6 @@
 //! Poses from frame-to-frame motions; every frame gets one.
 
-use crate::geometry::RigidMotion;
+use crate::geometry::{RigidMotion, Twist};
 
 use super::stereo::FrameMotion;
 
@@ -9,6 +9,8 @@ use super::stereo::FrameMotion;
 pub struct Trajectory {
     poses: Vec<RigidMotion>,
     times_s: Vec<f64>,
+    /// The last frame with an answer, and its velocity per second.
+    answered: Option<(usize, Twist)>,
 }
 
 impl Trajectory {
@@ -20,7 +22,8 @@ impl Trajectory {
     /// Append the next frame.
     ///
     /// Without an answer the camera is taken to stand still, until a later frame bridges the gap: then
-    /// the poses between are interpolated in time at constant φ.
+    /// the poses between are interpolated in time at constant φ. A gap that no frame bridges (the next answer
+    /// begins after it) is passed at the mean of the velocities before and after.
     pub fn push(&mut self, answer: &FrameMotion) {
         let last = self.poses.last().copied().unwrap_or_else(RigidMotion::identity);
         self.poses.push(last);
@@ -28,6 +31,18 @@ impl Trajectory {
         let (Ok(motion), Some(reference), Some(dt)) = (&answer.motion, answer.reference, answer.dt_s) else {
             return;
         };
+        let velocity = motion.phi().scaled(1.0 / dt);
+        let last = self.poses.len() - 1;
+        if let Some((from, before)) = self.answered.filter(|(from, _)| *from < reference) {
+            let mean = Twist::from_vector(&(0.5 * (before.vector() + velocity.vector())));
+            let (start, start_s) = (self.poses[from], self.times_s[from]);
+            for k in from + 1..=reference {
+                let gone_s = self.times_s[k] - start_s;
+                let gone_s = if gone_s.is_finite() { gone_s.max(0.0) } else { 0.0 };
+                self.poses[k] = start.after(&mean.scaled(gone_s).exp().inverse());
+            }
+        }
+        self.answered = Some((last, velocity));
         let (start, start_s) = (self.poses[reference], self.times_s[reference]);
         for k in reference + 1..self.poses.len() {
             // Frames without an answer may have any time, or none: they stay between their neighbours.

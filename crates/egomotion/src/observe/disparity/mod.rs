@@ -11,6 +11,7 @@ mod edges;
 mod fill;
 mod lanes;
 mod lucas_kanade;
+mod reading;
 mod rows;
 mod semi_global;
 mod slopes;
@@ -26,6 +27,7 @@ use serde::{Deserialize, Serialize};
 
 pub use area::AreaOptions;
 pub use census::CensusWindow;
+pub use reading::Reading;
 
 use crate::geometry::{Field, Image};
 

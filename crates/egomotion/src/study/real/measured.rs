@@ -73,7 +73,7 @@ impl Measured {
     /// The rounded maps of t and t+1 with the displacement between them: the discrete approach.
     pub fn pair(&self) -> DensePair<'_> {
         let [_, before, after] = &self.rounded;
-        DensePair { rig: &self.rig, before, after, flow: &self.flow, flow_right: None }
+        DensePair { rig: &self.rig, before, after, flow: &self.flow, flow_right: None, given: false }
     }
 
     /// Disparity, its central differences in space and in time, and the image velocity, at a pixel at t: (7).

@@ -1,0 +1,166 @@
+//! Frames from their files: images, rectified where they are raw, depth, given maps, given tracks.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use egomotion::geometry::{Field, Grid, Image};
+use egomotion::observe::{DisparityMap, FlowField, RectificationMap, Rectifier};
+use egomotion::pipeline::{DepthCamera, Frame, Unanswered};
+use egomotion_io::source::{DepthSensor, FrameFiles, Sequence};
+use egomotion_io::tracks::TrackTable;
+use egomotion_io::{IoError, depth, given, image, pfm};
+
+use super::{Fetched, Given};
+
+/// Where the parts of a frame come from.
+#[derive(Default)]
+pub struct Reader<'a> {
+    /// Turns raw images into rectified ones.
+    rectifier: Option<Rectifier>,
+    /// Takes disparity from depth images in place of the right ones.
+    depth: Option<(DepthCamera, DepthSensor)>,
+    /// Folder of disparity maps that take the place of our own.
+    pub disparity: Option<&'a Path>,
+    /// Folder of flow maps that take the place of our own.
+    pub flow: Option<&'a Path>,
+    /// Tracks that take the place of images.
+    pub tracks: Option<&'a TrackTable>,
+}
+
+/// Standard deviation of a given disparity or flow that comes without one, in pixels.
+const GIVEN_SIGMA_PX: f32 = 0.3;
+
+impl Reader<'_> {
+    /// Compute what the frames of a sequence need; with `depth` its depth images take the place of right ones.
+    pub fn new(sequence: &Sequence, depth: bool) -> Self {
+        let sensor = sequence.depth_sensor.filter(|_| depth);
+        let camera =
+            |sensor: DepthSensor| Some((DepthCamera { rig: sequence.rig?, noise: sensor.noise }, sensor));
+        Self {
+            rectifier: sequence.rectification.as_ref().map(Rectifier::new),
+            depth: sensor.and_then(camera),
+            ..Self::default()
+        }
+    }
+
+    /// Pixels that the left image does not show, if there are any, where `true`.
+    ///
+    /// The right image needs no mask: a rectified view shows what both images have, and where a lens model
+    /// ends before that the right image is black, which matches no texture.
+    pub fn unseen(&self) -> Option<&Grid<bool>> {
+        let unseen = self.rectifier.as_ref().map(|rectifier| rectifier.left().unseen());
+        unseen.filter(|unseen| unseen.values().contains(&true))
+    }
+
+    /// Read one frame; what cannot be read becomes the frame's status. The `last` frame has no flow.
+    pub fn read(&self, files: &FrameFiles, time_s: f64, last: bool) -> Fetched {
+        let start = Instant::now();
+        let frame = match self.tracks {
+            Some(table) => Ok(Given::Tracks(table.frames.get(&files.index).cloned().unwrap_or_default())),
+            None => self.frame(files, time_s, last).map(Given::Frame),
+        };
+        Fetched {
+            index: files.index,
+            time_s,
+            frame,
+            truth: files.truth,
+            decode_ms: start.elapsed().as_secs_f64() * 1e3,
+        }
+    }
+
+    fn frame(&self, files: &FrameFiles, time_s: f64, last: bool) -> Result<Frame, Unanswered> {
+        let given = self.disparity.map(|folder| given_disparity(folder, files)).transpose()?;
+        let flow = self.flow.filter(|_| !last).map(|folder| given_flow(folder, files)).transpose()?;
+        if let Some((camera, sensor)) = &self.depth {
+            let file = files.depth.as_ref().ok_or(Unanswered::MissingDepth)?;
+            let left = image::read(&files.left).map_err(bad)?;
+            let depth_m = depth::read(file, sensor.levels_per_m).map_err(bad)?;
+            let (left, depth_m) = match &sensor.lens {
+                Some(lens) => (lens.image(&camera.rig, &left), lens.depth(&camera.rig, &depth_m)),
+                None => (left, depth_m),
+            };
+            let frame = camera.frame(time_s, left, &depth_m);
+            return Ok(Frame { disparity: given.or(frame.disparity), flow, ..frame });
+        }
+        let (left, right) = match (&files.right, &given) {
+            (Some(right), _) => self.images(files, right).map(|(left, right)| (left, Some(right)))?,
+            (None, Some(_)) => (self.left(files)?, None),
+            (None, None) => return Err(Unanswered::MissingRight),
+        };
+        Ok(Frame { time_s, left, right, disparity: given, flow })
+    }
+
+    /// The left and right image of a frame, rectified.
+    pub fn images(&self, files: &FrameFiles, right: &Path) -> Result<(Image, Image), Unanswered> {
+        let (left_image, right_image) =
+            (image::read(&files.left).map_err(bad)?, image::read(right).map_err(bad)?);
+        if left_image.size() != right_image.size() {
+            let ((w, h), (wr, hr)) = (left_image.size(), right_image.size());
+            return Err(Unanswered::BadImage(format!(
+                "{}: {wr}x{hr} pixels, but the left image has {w}x{h}; give pairs of one size",
+                right.display()
+            )));
+        }
+        match &self.rectifier {
+            None => Ok((left_image, right_image)),
+            Some(rectifier) => Ok((
+                rectified(rectifier.left(), left_image, &files.left)?,
+                rectified(rectifier.right(), right_image, right)?,
+            )),
+        }
+    }
+
+    fn left(&self, files: &FrameFiles) -> Result<Image, Unanswered> {
+        let image = image::read(&files.left).map_err(bad)?;
+        match &self.rectifier {
+            None => Ok(image),
+            Some(rectifier) => rectified(rectifier.left(), image, &files.left),
+        }
+    }
+}
+
+fn rectified(map: &RectificationMap, raw: Image, path: &Path) -> Result<Image, Unanswered> {
+    let mut out = Grid::filled(0, 0, 0.0);
+    if map.warp(&raw, &mut out) {
+        return Ok(out);
+    }
+    let ((w, h), (wc, hc)) = (raw.size(), map.raw_size());
+    let reason = format!("{}: {w}x{h} pixels, but the camera's images have {wc}x{hc}", path.display());
+    Err(Unanswered::BadImage(reason))
+}
+
+fn bad(error: IoError) -> Unanswered {
+    Unanswered::BadImage(error.to_string())
+}
+
+/// The map of a frame, with its standard deviation where the folder has one beside it as `--maps` writes it.
+fn given_disparity(folder: &Path, files: &FrameFiles) -> Result<DisparityMap, Unanswered> {
+    let file = given::find(folder, &files.left, files.index, given::DISPARITY);
+    let shift = given::disparity(&file.ok_or(Unanswered::MissingDisparity)?).map_err(bad)?;
+    let sigma =
+        sigma_folder(folder).and_then(|folder| given::find(&folder, &files.left, files.index, &["pfm"]));
+    Ok(match sigma {
+        Some(sigma) => DisparityMap { shift, sigma: pfm::read(&sigma).map_err(bad)? },
+        None => DisparityMap::given(shift, |_| GIVEN_SIGMA_PX),
+    })
+}
+
+/// `disparity_sigma` beside `disparity`.
+fn sigma_folder(folder: &Path) -> Option<PathBuf> {
+    let name = folder.file_name()?.to_str()?;
+    Some(folder.with_file_name(format!("{name}_sigma"))).filter(|folder| folder.is_dir())
+}
+
+fn given_flow(folder: &Path, files: &FrameFiles) -> Result<FlowField, Unanswered> {
+    let file = given::find(folder, &files.left, files.index, given::FLOW);
+    let [u, v] = given::flow(&file.ok_or(Unanswered::MissingFlow)?).map_err(bad)?;
+    let (width, height) = u.size();
+    let both =
+        |value: f32| Grid::from_fn(width, height, |x, y| if known(&u, &v, x, y) { value } else { f32::NAN });
+    let variance = GIVEN_SIGMA_PX * GIVEN_SIGMA_PX;
+    Ok(FlowField { cov_uu: both(variance), cov_uv: both(0.0), cov_vv: both(variance), u, v })
+}
+
+fn known(u: &Field, v: &Field, x: usize, y: usize) -> bool {
+    u.get(x, y).is_some() && v.get(x, y).is_some()
+}

@@ -1,0 +1,243 @@
+//! NumPy arrays (`.npy`): numbers of any common type in either byte order, row by row or column by column.
+//!
+//! The head is read here and not by a crate: its length is the file's word, and nothing is allocated by it.
+
+use std::path::Path;
+
+use egomotion::geometry::{Field, Grid};
+
+use crate::{IoError, read};
+
+/// An array: its shape, and its values in C order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Array {
+    /// Length of each axis; none for a single number.
+    pub shape: Vec<usize>,
+    /// The values, the last axis running fastest.
+    pub values: Vec<f64>,
+}
+
+/// The longest head that is looked at, in bytes; NumPy's own are under 200.
+const LONGEST_HEAD: usize = 1 << 16;
+
+/// What every `.npy` starts with.
+const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// A map of two axes (height, width); every value that is not finite is missing.
+///
+/// # Errors
+/// The file cannot be read, or [`decode`] refuses its content, or it has not two axes.
+pub fn read_map(path: &Path) -> Result<Field, IoError> {
+    let array = decode(&read::bytes(path)?, path)?;
+    let refuse =
+        || IoError::new(path, format_args!("has the shape {:?}", array.shape), "give (height, width)");
+    let &[height, width] = array.shape.as_slice() else { return Err(refuse()) };
+    read::pixels(path, width, height)?;
+    let values = array.values.iter().map(|&v| v as f32).collect();
+    Grid::from_values(width, height, values).map(Field::from_grid).ok_or_else(refuse)
+}
+
+/// A flow map of the axes (height, width, 2); a pixel is missing where one component is not finite.
+///
+/// # Errors
+/// The file cannot be read, or [`decode`] refuses its content, or it has other axes.
+pub fn read_flow(path: &Path) -> Result<[Field; 2], IoError> {
+    let array = decode(&read::bytes(path)?, path)?;
+    let refuse =
+        || IoError::new(path, format_args!("has the shape {:?}", array.shape), "give (height, width, 2)");
+    let &[height, width, 2] = array.shape.as_slice() else { return Err(refuse()) };
+    read::pixels(path, width, height)?;
+    let (pixels, _) = array.values.as_chunks::<2>();
+    let plane = |k: usize| {
+        let value = |pixel: &[f64; 2]| {
+            if pixel.iter().all(|v| v.is_finite()) { pixel[k] as f32 } else { f32::NAN }
+        };
+        Grid::from_values(width, height, pixels.iter().map(value).collect()).map(Field::from_grid)
+    };
+    plane(0).zip(plane(1)).map(|(u, v)| [u, v]).ok_or_else(refuse)
+}
+
+/// An array from the content of a `.npy`; `path` names it in errors.
+///
+/// # Errors
+/// The head is not that of a `.npy`, the type is no number, or the length does not fit the shape.
+pub fn decode(content: &[u8], path: &Path) -> Result<Array, IoError> {
+    let refuse = |reason: String| IoError::new(path, reason, "give a NumPy array of numbers (np.save)");
+    let (head, values) = split(content).ok_or_else(|| refuse("is not a .npy file".into()))?;
+    let head = Head::parse(head).map_err(refuse)?;
+    let count = head.shape.iter().try_fold(1_usize, |n, &side| n.checked_mul(side));
+    let count = count.filter(|n| (1..=read::MAX_PIXELS).contains(n)).ok_or_else(|| {
+        refuse(format!("has the shape {:?}, not 1 to {} numbers", head.shape, read::MAX_PIXELS))
+    })?;
+    let size = head.kind.size();
+    if values.len() != count * size {
+        return Err(refuse(format!(
+            "holds {} bytes of values, its shape {:?} needs {}",
+            values.len(),
+            head.shape,
+            count * size
+        )));
+    }
+    let values: Vec<f64> = values.chunks_exact(size).map(|bytes| head.kind.number(bytes)).collect();
+    let values = if head.fortran { transposed(&values, &head.shape) } else { values };
+    Ok(Array { shape: head.shape, values })
+}
+
+/// The head's text, and what follows it.
+fn split(content: &[u8]) -> Option<(&str, &[u8])> {
+    let rest = content.strip_prefix(MAGIC)?;
+    let (version, rest) = rest.split_first_chunk::<2>()?;
+    let (length, rest) = match version[0] {
+        1 => rest.split_first_chunk::<2>().map(|(n, rest)| (u16::from_le_bytes(*n) as usize, rest))?,
+        2 | 3 => rest.split_first_chunk::<4>().map(|(n, rest)| (u32::from_le_bytes(*n) as usize, rest))?,
+        _ => return None,
+    };
+    let (head, values) = rest.split_at_checked(length).filter(|_| length <= LONGEST_HEAD)?;
+    Some((std::str::from_utf8(head).ok()?, values))
+}
+
+/// From the order in which the first axis runs fastest to that in which the last does.
+fn transposed(values: &[f64], shape: &[usize]) -> Vec<f64> {
+    let mut index = vec![0; shape.len()];
+    let mut out = Vec::with_capacity(values.len());
+    for _ in 0..values.len() {
+        let at = index.iter().zip(shape).rev().fold(0, |at, (&i, &side)| at * side + i);
+        out.push(values[at]);
+        for (i, &side) in index.iter_mut().zip(shape).rev() {
+            *i += 1;
+            if *i < side {
+                break;
+            }
+            *i = 0;
+        }
+    }
+    out
+}
+
+/// The type of the numbers.
+#[derive(Debug, Clone, Copy)]
+struct Kind {
+    /// f, i or u.
+    class: u8,
+    bytes: usize,
+    big: bool,
+}
+
+impl Kind {
+    fn parse(text: &str) -> Option<Self> {
+        let &[order, class, bytes] = text.as_bytes() else { return None };
+        let bytes = usize::from(bytes.checked_sub(b'0')?);
+        let known = match class {
+            b'f' => matches!(bytes, 4 | 8),
+            b'i' | b'u' => matches!(bytes, 1 | 2 | 4 | 8),
+            _ => false,
+        };
+        let big = match order {
+            b'<' | b'|' => false,
+            b'>' => true,
+            b'=' => cfg!(target_endian = "big"),
+            _ => return None,
+        };
+        known.then_some(Self { class, bytes, big })
+    }
+
+    fn size(self) -> usize {
+        self.bytes
+    }
+
+    /// One number from as many bytes as it has.
+    fn number(self, bytes: &[u8]) -> f64 {
+        let mut little = [0_u8; 8];
+        for (k, &byte) in bytes.iter().enumerate().take(8) {
+            little[if self.big { bytes.len() - 1 - k } else { k }] = byte;
+        }
+        let bits = u64::from_le_bytes(little);
+        match (self.class, self.bytes) {
+            (b'f', 4) => f64::from(f32::from_bits(bits as u32)),
+            (b'f', _) => f64::from_bits(bits),
+            (b'u', _) => bits as f64,
+            // The sign bit of a shorter number moves to the top and back.
+            (_, n) => ((bits << (64 - 8 * n)) as i64 >> (64 - 8 * n)) as f64,
+        }
+    }
+}
+
+/// The head: a Python dictionary of three entries.
+#[derive(Debug)]
+struct Head {
+    kind: Kind,
+    fortran: bool,
+    shape: Vec<usize>,
+}
+
+impl Head {
+    fn parse(text: &str) -> Result<Self, String> {
+        let entry = |key: &str| {
+            let at = text.find(&format!("'{key}'")).or_else(|| text.find(&format!("\"{key}\"")));
+            let rest = &text[at.ok_or_else(|| format!("has no {key}"))? + key.len() + 2..];
+            rest.trim_start().strip_prefix(':').map(str::trim_start).ok_or_else(|| format!("has no {key}"))
+        };
+        let descr = entry("descr")?;
+        let word: String = descr.chars().skip(1).take_while(|c| !matches!(c, '\'' | '"')).take(16).collect();
+        let kind = Kind::parse(&word).ok_or_else(|| format!("has numbers of the type \"{word}\""))?;
+        let order = entry("fortran_order")?;
+        let fortran = order.starts_with("True");
+        if !fortran && !order.starts_with("False") {
+            return Err("has no fortran_order".into());
+        }
+        let shape = entry("shape")?;
+        let inner = shape.strip_prefix('(').and_then(|rest| rest.split_once(')')).map(|(inner, _)| inner);
+        let sides = inner.ok_or("has no shape")?.split(',').map(str::trim).filter(|side| !side.is_empty());
+        let shape = sides.take(33).map(|side| side.parse::<usize>()).collect::<Result<Vec<_>, _>>();
+        let shape = shape.ok().filter(|shape| shape.len() <= 32).ok_or("has no shape")?;
+        Ok(Self { kind, fortran, shape })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file as NumPy writes it.
+    fn npy(descr: &str, fortran: &str, shape: &str, values: &[u8]) -> Vec<u8> {
+        let head = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}\n");
+        let length = (head.len() as u16).to_le_bytes();
+        [MAGIC, &[1, 0], &length, head.as_bytes(), values].concat()
+    }
+
+    fn values(content: &[u8]) -> (Vec<usize>, Vec<f64>) {
+        let array = decode(content, Path::new("a.npy")).unwrap();
+        (array.shape, array.values)
+    }
+
+    fn refused(content: &[u8]) -> String {
+        decode(content, Path::new("a.npy")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn types_orders_and_shapes() {
+        let f32s = [1.5f32, -2.0, 3.0, 4.0, 5.0, 6.0].map(f32::to_le_bytes).concat();
+        let expected = vec![1.5, -2.0, 3.0, 4.0, 5.0, 6.0];
+        assert_eq!(values(&npy("<f4", "False", "(2, 3)", &f32s)), (vec![2, 3], expected));
+        // Columns first: the same bytes are another matrix.
+        assert_eq!(values(&npy("<f4", "True", "(2, 3)", &f32s)).1, [1.5, 3.0, 5.0, -2.0, 4.0, 6.0]);
+        let big = [0.1f64, -7.0].map(f64::to_be_bytes).concat();
+        assert_eq!(values(&npy(">f8", "False", "(2,)", &big)), (vec![2], vec![0.1, -7.0]));
+        assert_eq!(values(&npy("|i1", "False", "(2,)", &[255, 3])).1, [-1.0, 3.0]);
+        assert_eq!(values(&npy(">u2", "False", "(2,)", &[1, 0, 255, 255])).1, [256.0, 65535.0]);
+        assert_eq!(values(&npy("<i4", "False", "()", &(-5i32).to_le_bytes())), (vec![], vec![-5.0]));
+    }
+
+    #[test]
+    fn heads_and_lengths_are_checked() {
+        assert!(refused(b"\x93NUMPX").contains("a.npy: is not a .npy file"));
+        assert!(refused(&npy("<c8", "False", "(1,)", &[0; 8])).contains("type \"<c8\""));
+        assert!(refused(&npy("<f4", "Maybe", "(1,)", &[0; 4])).contains("fortran_order"));
+        assert!(refused(&npy("<f4", "False", "(2,)", &[0; 4])).contains("holds 4 bytes"));
+        assert!(refused(&npy("<f4", "False", "(99999999, 99999999)", &[])).contains("shape"));
+        assert!(refused(&npy("<f4", "False", "(18446744073709551615, 2)", &[])).contains("shape"));
+        assert!(refused(&npy("<f4", "False", "(-1, 2)", &[])).contains("shape"));
+        // A head longer than the file.
+        assert!(refused(&[MAGIC, &[2, 0, 255, 255, 255, 255]].concat()).contains("not a .npy"));
+    }
+}

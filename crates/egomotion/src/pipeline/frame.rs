@@ -1,0 +1,112 @@
+//! What is given of one time: images, and what is known of them already.
+
+use super::unanswered::Unanswered;
+use crate::geometry::{Field, Grid, Image, StereoRig};
+use crate::observe::{DisparityMap, FlowField};
+
+/// A rectified pair of images of one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StereoFrame {
+    /// Time in seconds; it must increase from frame to frame.
+    pub time_s: f64,
+    /// Left image, of the rig's size.
+    pub left: Image,
+    /// Right image, of the rig's size.
+    pub right: Image,
+}
+
+/// What is given of one time: the left image, and a right image or disparity or both.
+///
+/// What is given is not computed. Without a right image the corners take their disparity from the map
+/// too: a depth camera is a rig whose disparity is given (see [`super::rgbd`]).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Frame {
+    /// Time in seconds; it must increase from frame to frame.
+    pub time_s: f64,
+    /// Left image, of the rig's size.
+    pub left: Image,
+    /// Right image, of the rig's size.
+    pub right: Option<Image>,
+    /// Disparity of the left image's pixels.
+    pub disparity: Option<DisparityMap>,
+    /// Flow of the left image to the next frame; not used where that one is bad and another is compared with.
+    pub flow: Option<FlowField>,
+}
+
+impl From<StereoFrame> for Frame {
+    fn from(StereoFrame { time_s, left, right }: StereoFrame) -> Self {
+        Self { time_s, left, right: Some(right), disparity: None, flow: None }
+    }
+}
+
+/// Least standard deviation of the grey levels of a usable image.
+const LEAST_CONTRAST: f64 = 1.0;
+
+impl Frame {
+    /// Whether its images and maps can be used with a rig.
+    pub(super) fn check(&self, rig: &StereoRig) -> Result<(), Unanswered> {
+        let expected = (rig.width_px, rig.height_px);
+        let sized = |what: &str, (w, h): (usize, usize)| {
+            let reason = || format!("the {what} is {w}x{h}, the rig {}x{}", expected.0, expected.1);
+            if (w, h) == expected { Ok(()) } else { Err(Unanswered::BadImage(reason())) }
+        };
+        for (side, image) in [("left", Some(&self.left)), ("right", self.right.as_ref())] {
+            let Some(image) = image else { continue };
+            sized(&format!("{side} image"), image.size())?;
+            let contrast = contrast(image);
+            if contrast.is_nan() {
+                return Err(Unanswered::BadImage(format!(
+                    "the {side} image has values that are not numbers"
+                )));
+            }
+            if contrast < LEAST_CONTRAST {
+                return Err(Unanswered::BadImage(format!("the {side} image is constant")));
+            }
+        }
+        if let Some(flow) = &self.flow {
+            sized("flow", flow.size())?;
+        }
+        match &self.disparity {
+            Some(map) => {
+                sized("disparity map", map.shift.size())?;
+                sized("disparity's standard deviation", map.sigma.size())
+            }
+            None if self.right.is_none() => Err(Unanswered::MissingRight),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Standard deviation of the grey levels; NaN if one of them is not a number.
+fn contrast(image: &Image) -> f64 {
+    const LANES: usize = 8;
+    let n = image.values().len().max(1) as f64;
+    // Differences from one grey level: squares of the levels themselves would cancel.
+    let level = f64::from(image.values().first().copied().unwrap_or(0.0));
+    let (mut sums, mut squares) = ([0.0; LANES], [0.0; LANES]);
+    let (chunks, rest) = image.values().as_chunks::<LANES>();
+    for chunk in chunks {
+        for i in 0..LANES {
+            let x = f64::from(chunk[i]) - level;
+            sums[i] += x;
+            squares[i] += x * x;
+        }
+    }
+    let rest = rest.iter().map(|&v| f64::from(v) - level);
+    let mean = (sums.iter().sum::<f64>() + rest.clone().sum::<f64>()) / n;
+    let square = (squares.iter().sum::<f64>() + rest.map(|x| x * x).sum::<f64>()) / n;
+    let variance = square - mean * mean;
+    // Rounding may make it negative, and comparisons must let NaN through.
+    if variance < 0.0 { 0.0 } else { variance.sqrt() }
+}
+
+/// Clear the pixels that the mask excludes.
+pub(super) fn erase(field: &mut Field, mask: &Grid<bool>) {
+    for v in 0..field.height().min(mask.height()) {
+        for (value, &masked) in field.row_mut(v).iter_mut().zip(mask.row(v)) {
+            if masked {
+                *value = f32::NAN;
+            }
+        }
+    }
+}
