@@ -8,6 +8,7 @@ use crate::study::StudyCommand;
 use egomotion::metrics::{Alignment, Delta};
 use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
 
+use crate::maps::MapFiles;
 use crate::simulate::check_size;
 
 /// 3D motion, depth velocity and time to impact from stereo, each with an uncertainty that can be trusted.
@@ -133,6 +134,12 @@ pub struct RunArgs {
     /// Write the maps of every frame (disparity, flow, depth velocity, impact) as PFM and .flo.
     #[arg(long)]
     pub maps: bool,
+    /// Write the maps of every frame in these formats.
+    #[arg(long, value_enum, value_name = "FORMAT,…", value_delimiter = ',')]
+    pub maps_as: Vec<MapFormat>,
+    /// Write every frame as a cloud of points (PLY) in the colours of a quantity.
+    #[arg(long, value_enum, value_name = "QUANTITY")]
+    pub cloud: Option<CloudArg>,
     /// Settings as TOML; options given here come before those in the file.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -148,6 +155,49 @@ pub struct RunArgs {
     /// Print the summary as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+impl RunArgs {
+    /// What is written of each frame pair.
+    pub fn map_files(&self) -> MapFiles {
+        let mut formats = self.maps_as.clone();
+        if self.maps && !formats.contains(&MapFormat::Pfm) {
+            formats.push(MapFormat::Pfm);
+        }
+        MapFiles { formats, cloud: self.cloud }
+    }
+}
+
+/// A format of maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MapFormat {
+    /// PFM, flow as .flo.
+    Pfm,
+    /// NumPy arrays of single precision.
+    Npy,
+    /// KITTI's 16-bit PNG, of disparity and flow alone.
+    Kitti,
+    /// PNG in colours, to look at.
+    Colour,
+}
+
+/// What a cloud's colours show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CloudArg {
+    /// Depth velocity.
+    Vz,
+    /// Time to impact.
+    Impact,
+}
+
+impl CloudArg {
+    /// Name of the property in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Vz => "depth_velocity",
+            Self::Impact => "impact",
+        }
+    }
 }
 
 #[derive(Debug, Args)]

@@ -14,6 +14,7 @@ use crate::Ending;
 use crate::args::DemoArgs;
 use crate::feed::{Fetched, Given};
 use crate::judge::MapTally;
+use crate::maps::MapFiles;
 use crate::results::{About, ResultFolder};
 use crate::run::set_threads;
 use crate::session::{Outcome, Row, Session, progress, stop_signal};
@@ -30,7 +31,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
     set_threads(args.threads)?;
     let config = Config::default();
     let out: PathBuf = args.out.clone().unwrap_or_else(|| Path::new("egomotion-out").join("demo"));
-    let folder = ResultFolder::create(&out, false)?;
+    let folder = ResultFolder::create(&out)?;
     let sequence = Sequence::named("demo", None, None, 1.0).context("the demo's scene is missing")?;
     let noise = SensorNoise::default().with_seed(NOISE_SEED);
     let stop = stop_signal();
@@ -40,7 +41,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         frames: sequence.frames(),
         mask: None,
         tracks: false,
-        maps: false,
+        maps: MapFiles::default(),
         progress: progress(sequence.frames(), args.quiet),
     };
     let mut stdout = terminal::stdout();

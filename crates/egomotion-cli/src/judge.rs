@@ -4,7 +4,6 @@ use anyhow::Result;
 use egomotion::geometry::{Field, StereoRig};
 use egomotion::metrics::{self, Nees};
 use egomotion::pipeline::stereo::DenseResults;
-use egomotion_io::disparity_png;
 use egomotion_io::source::TruthMaps;
 use serde::Serialize;
 
@@ -106,7 +105,7 @@ impl MapTally {
 /// Compare with the disparities that a scene knows at both times of the earlier frame's pixels.
 pub fn scene_maps(rig: &StereoRig, dense: &DenseResults, truth: &TruthMaps) -> Result<Option<MapVerdict>> {
     let (Some(now), Some(next)) = (&truth.disparity, &truth.next_disparity) else { return Ok(None) };
-    let (now, next): (Field, Field) = (disparity_png::read(now)?, disparity_png::read(next)?);
+    let (now, next): (Field, Field) = (now.read()?, next.read()?);
     if now.size() != dense.disparity.shift.size() || next.size() != now.size() {
         return Ok(None);
     }

@@ -4,12 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use egomotion::geometry::StereoRig;
-use egomotion::motion::TimeToImpact;
-use egomotion::pipeline::stereo::DenseResults;
 use egomotion::pipeline::{Config, Observe};
 use egomotion_io::motion_table::{self, Motion, MotionRow};
 use egomotion_io::trajectory::{Pose, write_euroc, write_kitti, write_tum};
-use egomotion_io::{flo, pfm, write};
+use egomotion_io::write;
 use serde::Serialize;
 
 use crate::moving;
@@ -22,31 +20,14 @@ pub struct ResultFolder {
     path: PathBuf,
 }
 
-/// The folders of maps.
-const MAPS: [&str; 8] = [
-    "disparity",
-    "disparity_sigma",
-    "flow",
-    "depth_velocity",
-    "depth_velocity_sigma",
-    "impact",
-    "impact_lo",
-    "impact_hi",
-];
-
 impl ResultFolder {
-    /// Make the folder, and those of the maps if they will be written.
-    pub fn create(path: &Path, maps: bool) -> Result<Self> {
+    /// Make the folder.
+    pub fn create(path: &Path) -> Result<Self> {
         write::folder(path)?;
         // Find out now, not after an hour, that nothing can be written here.
         let probe = path.join(".egomotion-writable");
         write::bytes(&probe, b"")?;
         let _ = std::fs::remove_file(&probe);
-        if maps {
-            for name in MAPS {
-                write::folder(&path.join(name))?;
-            }
-        }
         Ok(Self { path: path.to_owned() })
     }
 
@@ -65,27 +46,6 @@ impl ResultFolder {
         let mut text = serde_json::to_string_pretty(value).context("cannot put the summary into JSON")?;
         text.push('\n');
         self.write(name, text.as_bytes())
-    }
-
-    /// Write the maps of the frame pair whose earlier frame has `index` in the source.
-    pub fn write_maps(&self, index: usize, dense: &DenseResults) -> Result<()> {
-        let file =
-            |folder: &str, extension: &str| self.path.join(folder).join(format!("{index:06}.{extension}"));
-        let motion = &dense.motion;
-        let interval = |impact: &TimeToImpact| impact.interval95_s();
-        for (folder, map) in [
-            ("disparity", dense.disparity.shift.grid()),
-            ("disparity_sigma", dense.disparity.sigma.grid()),
-            ("depth_velocity", motion.depth_velocity.grid()),
-            ("depth_velocity_sigma", motion.depth_velocity_sigma.grid()),
-            ("impact", &motion.seconds(TimeToImpact::seconds)),
-            ("impact_lo", &motion.seconds(|impact| Some(interval(impact)?.0))),
-            ("impact_hi", &motion.seconds(|impact| Some(interval(impact)?.1))),
-        ] {
-            pfm::write(&file(folder, "pfm"), map)?;
-        }
-        flo::write(&file("flow", "flo"), &[dense.flow.u.clone(), dense.flow.v.clone()])?;
-        Ok(())
     }
 
     /// Write the trajectory in all formats, `motion.csv`, and where every pixel was seen `moving.csv`.

@@ -9,12 +9,13 @@ use anyhow::{Context, Result, anyhow, bail};
 use egomotion::geometry::{Grid, StereoRig};
 use egomotion::pipeline::{Config, Observe, Unanswered};
 use egomotion_io::image;
-use egomotion_io::source::{FrameFiles, Sequence, Source};
+use egomotion_io::source::{FrameFiles, Layout, Sequence, Source};
 use egomotion_io::tracks;
 
 use crate::args::{RunArgs, SensorArg};
 use crate::feed;
 use crate::judge::{self, MapVerdict};
+use crate::pairs;
 use crate::results::{About, ResultFolder};
 use crate::session::{Session, progress, stop_signal};
 use crate::summary::{Index, SceneEntry, Summary};
@@ -27,6 +28,9 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
     let source = Source::open_with(&args.source, args.calibration.as_deref())?;
     let out = args.out.clone().unwrap_or_else(|| default_out(&args.source));
     let stop = stop_signal();
+    if source.layout == Layout::StereoPairs {
+        return pairs::run(args, &config, &source, &out, &stop);
+    }
     if !source.layout.is_scene_set() {
         let done = run_sequence(args, &config, &source.sequences[0], &out, &stop)?;
         print_result(args, &done.summary, &out)?;
@@ -35,7 +39,7 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
     }
     let mut scenes = Vec::new();
     let mut complete = true;
-    let folder = ResultFolder::create(&out, false)?;
+    let folder = ResultFolder::create(&out)?;
     for scene in &source.sequences {
         let folder = out.join(&scene.name);
         let entry = match run_sequence(args, &config, scene, &folder, &stop) {
@@ -101,7 +105,7 @@ fn resolve_config(args: &RunArgs) -> Result<Config> {
         config.seed = seed;
     }
     config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
-    if args.maps && config.observe == Observe::Sparse {
+    if args.map_files().any() && config.observe == Observe::Sparse {
         let reason = "--maps needs the maps of every pixel: use observe dense (the default), not sparse";
         return Err(Usage(reason.into()).into());
     }
@@ -148,7 +152,7 @@ fn run_sequence(
         None => config.clone(),
     };
     config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
-    if tracks.is_some() && (args.maps || args.disparity.is_some() || args.flow.is_some()) {
+    if tracks.is_some() && (args.map_files().any() || args.disparity.is_some() || args.flow.is_some()) {
         return Err(Usage("--maps, --disparity and --flow need images, not tracks".into()).into());
     }
     check_sensor(args, sequence)?;
@@ -160,18 +164,13 @@ fn run_sequence(
     };
     let mask = args.mask.as_deref().map(|path| read_mask(path, &rig)).transpose()?;
     let mask = joined(mask, reader.unseen());
-    let folder = ResultFolder::create(out, args.maps)?;
+    let folder = ResultFolder::create(out)?;
+    let maps = args.map_files();
+    maps.folders(out)?;
     let bar = progress(frames.len(), args.quiet);
     bar.set_message(sequence.name.clone());
-    let session = Session {
-        rig,
-        config,
-        frames: frames.len(),
-        mask,
-        tracks: tracks.is_some(),
-        maps: args.maps,
-        progress: bar,
-    };
+    let session =
+        Session { rig, config, frames: frames.len(), mask, tracks: tracks.is_some(), maps, progress: bar };
     let mut truth_maps: Option<MapVerdict> = None;
     let mut first_failure = None;
     let outcome = session.run(

@@ -11,6 +11,7 @@ use egomotion::pipeline::{Config, FrameMotion, Observe, StereoMotion, TrackMotio
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::feed::{Fetched, Given, with_frames};
+use crate::maps::MapFiles;
 use crate::report::{Album, FramePictures};
 use crate::results::ResultFolder;
 use crate::terminal::tell;
@@ -25,8 +26,8 @@ pub struct Session<'a> {
     pub mask: Option<Grid<bool>>,
     /// Frames are tracks, not images.
     pub tracks: bool,
-    /// Write the maps of every frame.
-    pub maps: bool,
+    /// Which files of maps are written.
+    pub maps: MapFiles,
     pub progress: ProgressBar,
 }
 
@@ -133,8 +134,8 @@ impl Session<'_> {
                     let index = rows.get(*r).map_or(*r, |row| row.index);
                     let width_px = album.width_px(image.size());
                     album.offer(|| FramePictures::new(index, rows.len(), image, dense, dt_s, width_px));
-                    if self.maps {
-                        out.write_maps(index, dense)?;
+                    if self.maps.any() {
+                        self.maps.write(out.path(), index, dense, &self.rig)?;
                     }
                 }
                 tally.aside_ms += writing.elapsed().as_secs_f64() * 1e3;

@@ -25,7 +25,7 @@ pub fn man(args: &ManArgs) -> Result<Ending> {
         terminal::stdout().write_all(&page(command)?)?;
         return Ok(Ending::Done);
     };
-    let folder = ResultFolder::create(folder, false)?;
+    let folder = ResultFolder::create(folder)?;
     for inner in command.get_subcommands().filter(|inner| inner.get_name() != "help") {
         let name = format!("egomotion-{}", inner.get_name());
         // Clap keeps names for the life of the process; there are a dozen.

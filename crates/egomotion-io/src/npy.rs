@@ -6,7 +6,7 @@ use std::path::Path;
 
 use egomotion::geometry::{Field, Grid};
 
-use crate::{IoError, read};
+use crate::{IoError, read, write};
 
 /// An array: its shape, and its values in C order.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,13 +28,49 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 /// # Errors
 /// The file cannot be read, or [`decode`] refuses its content, or it has not two axes.
 pub fn read_map(path: &Path) -> Result<Field, IoError> {
-    let array = decode(&read::bytes(path)?, path)?;
+    map(&decode(&read::bytes(path)?, path)?, path)
+}
+
+/// An array of two axes as a map.
+pub(crate) fn map(array: &Array, path: &Path) -> Result<Field, IoError> {
     let refuse =
         || IoError::new(path, format_args!("has the shape {:?}", array.shape), "give (height, width)");
     let &[height, width] = array.shape.as_slice() else { return Err(refuse()) };
     read::pixels(path, width, height)?;
     let values = array.values.iter().map(|&v| v as f32).collect();
     Grid::from_values(width, height, values).map(Field::from_grid).ok_or_else(refuse)
+}
+
+/// Write a map as an array of single precision, (height, width); missing pixels are NaN.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(path: &Path, map: &Grid<f32>) -> Result<(), IoError> {
+    array(path, &format!("({}, {})", map.height(), map.width()), map.values().iter().copied())
+}
+
+/// Write a flow map as an array of single precision, (height, width, 2); missing pixels are NaN.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_flow(path: &Path, [u, v]: [&Field; 2]) -> Result<(), IoError> {
+    let pixels = u.grid().values().iter().zip(v.grid().values());
+    let shape = format!("({}, {}, 2)", u.height(), u.width());
+    array(path, &shape, pixels.flat_map(|(&u, &v)| [u, v]))
+}
+
+/// An array of version 1.0, whose values begin at a multiple of 64 bytes.
+fn array(path: &Path, shape: &str, values: impl Iterator<Item = f32>) -> Result<(), IoError> {
+    let mut head = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}");
+    let begun = MAGIC.len() + 4 + head.len() + 1;
+    head.extend(std::iter::repeat_n(' ', begun.next_multiple_of(64) - begun));
+    head.push('\n');
+    let mut content = MAGIC.to_vec();
+    content.extend([1, 0]);
+    content.extend((head.len() as u16).to_le_bytes());
+    content.extend(head.as_bytes());
+    values.for_each(|value| content.extend(value.to_le_bytes()));
+    write::bytes(path, &content)
 }
 
 /// A flow map of the axes (height, width, 2); a pixel is missing where one component is not finite.

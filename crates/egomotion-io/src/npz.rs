@@ -3,6 +3,7 @@
 use std::io::{Cursor, Read};
 use std::path::Path;
 
+use egomotion::geometry::Field;
 use zip::ZipArchive;
 
 use crate::npy::{self, Array};
@@ -52,6 +53,22 @@ impl<'a> Npz<'a> {
         let array = npy::decode(&content, self.path);
         array.map_err(|error| IoError { reason: format!("array \"{name}\" {}", error.reason), ..error })
     }
+}
+
+/// The only array of a file as a map (height, width); every value that is not finite is missing.
+///
+/// # Errors
+/// The file cannot be read, or does not hold just one array of two axes.
+pub fn read_map(path: &Path) -> Result<Field, IoError> {
+    let content = read(path)?;
+    let mut npz = Npz::open(&content, path)?;
+    let names: Vec<String> =
+        npz.archive.file_names().flatten().map(|name| name.trim_end_matches(".npy").to_owned()).collect();
+    let [name] = names.as_slice() else {
+        let reason = format_args!("holds {} arrays, not one map", names.len()).to_string();
+        return Err(IoError::new(path, reason, "give one array of (height, width)"));
+    };
+    npy::map(&npz.array(name)?, path)
 }
 
 /// The content of an `.npz` file for [`Npz::open`].

@@ -7,9 +7,11 @@ mod kitti_odometry;
 mod kitti_raw;
 mod kitti_scenes;
 mod listing;
+mod middlebury;
 mod moments;
 mod stamped_poses;
 mod tartanair;
+mod true_disparity;
 mod tum_rgbd;
 
 use std::fmt;
@@ -20,6 +22,7 @@ use egomotion::pipeline::rgbd::DepthNoise;
 
 use crate::IoError;
 use crate::lens::Lens;
+pub use true_disparity::{DisparityEncoding, TrueDisparity};
 
 /// A recognised recording: one sequence, or a set of independent scenes.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +64,8 @@ pub enum Layout {
     TartanAirV2,
     /// Stereo tracks with their rig in an `.npz`, and no images.
     FeatureTracks,
+    /// Pairs without a second time, as in the Middlebury sets.
+    StereoPairs,
 }
 
 /// The depth camera of a sequence, whose depth images lie on the left image's pixels.
@@ -145,15 +150,15 @@ pub enum Clock {
 }
 
 /// True maps of one frame of a scene; each is `None` where its file is missing.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct TruthMaps {
     /// The frame that they belong to, by [`FrameFiles::index`].
     pub index: usize,
-    /// Disparity at this frame, a file for [`crate::disparity_png`].
-    pub disparity: Option<PathBuf>,
-    /// Disparity at the next frame of this frame's pixels, a file for [`crate::disparity_png`].
-    pub next_disparity: Option<PathBuf>,
+    /// Disparity at this frame.
+    pub disparity: Option<TrueDisparity>,
+    /// Disparity at the next frame of this frame's pixels.
+    pub next_disparity: Option<TrueDisparity>,
     /// Flow to the next frame, a file for [`crate::flow_png`].
     pub flow: Option<PathBuf>,
 }
@@ -206,6 +211,7 @@ impl Source {
             tum_rgbd::recognise,
             tartanair::recognise,
             feature_tracks::recognise,
+            middlebury::recognise,
         ] {
             recognised = layout(&folder, calibration)?;
             if recognised.is_some() {
@@ -247,6 +253,7 @@ impl fmt::Display for Layout {
             Self::TartanAirV1 => "TartanAir 1",
             Self::TartanAirV2 => "TartanAir 2",
             Self::FeatureTracks => "stereo tracks",
+            Self::StereoPairs => "stereo pairs",
         })
     }
 }

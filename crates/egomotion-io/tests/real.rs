@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use egomotion::geometry::RigidMotion;
 use egomotion::metrics::{relative_pose_error, travelled_m};
 use egomotion_io::source::{Clock, Layout};
-use egomotion_io::{IoError, Source, disparity_png, flo, flow_png, image};
+use egomotion_io::{IoError, Source, flo, flow_png, image};
 
 /// A folder of the real data; `None`, and a line that says so, where it is missing.
 fn data(name: &str) -> Option<PathBuf> {
@@ -115,8 +115,8 @@ fn kitti_scene_flow_2015() -> Result<(), IoError> {
         near(rig.baseline_m, 0.5327, 5e-5);
         let truth = sequence.truth_maps.as_ref().unwrap();
         assert_eq!(truth.index, 10);
-        let before = disparity_png::read(truth.disparity.as_ref().unwrap())?;
-        let after = disparity_png::read(truth.next_disparity.as_ref().unwrap())?;
+        let before = truth.disparity.as_ref().unwrap().read()?;
+        let after = truth.next_disparity.as_ref().unwrap().read()?;
         let [vx, vy] = flow_png::read(truth.flow.as_ref().unwrap())?;
         for field in [&before, &after, &vx, &vy] {
             assert_eq!(field.size(), (rig.width_px, rig.height_px));
@@ -151,7 +151,7 @@ fn kitti_stereo_flow_2012() -> Result<(), IoError> {
     assert_eq!((first.rig.unwrap().width_px, first.rig.unwrap().height_px), (1241, 376));
     let truth = first.truth_maps.as_ref().unwrap();
     assert!(truth.next_disparity.is_none());
-    assert!(disparity_png::read(truth.disparity.as_ref().unwrap())?.count() > 10_000);
+    assert!(truth.disparity.as_ref().unwrap().read()?.count() > 10_000);
     assert!(flow_png::read(truth.flow.as_ref().unwrap())?[0].count() > 10_000);
     Ok(())
 }

@@ -13,7 +13,7 @@ use egomotion_io::{IoError, depth, given, image, pfm};
 use super::{Fetched, Given};
 
 /// Where the parts of a frame come from.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub struct Reader<'a> {
     /// Turns raw images into rectified ones.
     rectifier: Option<Rectifier>,
@@ -50,6 +50,12 @@ impl Reader<'_> {
     pub fn unseen(&self) -> Option<&Grid<bool>> {
         let unseen = self.rectifier.as_ref().map(|rectifier| rectifier.left().unseen());
         unseen.filter(|unseen| unseen.values().contains(&true))
+    }
+
+    /// The images of a stereo pair.
+    pub fn pair(sequence: &Sequence, files: &FrameFiles) -> Result<(Image, Image), Unanswered> {
+        let right = files.right.as_ref().ok_or(Unanswered::MissingRight)?;
+        Self::new(sequence, false).images(files, right)
     }
 
     /// Read one frame; what cannot be read becomes the frame's status. The `last` frame has no flow.

@@ -54,7 +54,7 @@ struct Found<R> {
 impl Laboratory {
     /// A laboratory with this folder; it stops after the running part once `stop` is set.
     pub fn open(out: &Path, options: Options, stop: Arc<AtomicBool>) -> Result<Self> {
-        let folder = ResultFolder::create(out, false)?;
+        let folder = ResultFolder::create(out)?;
         // The page's name is taken.
         let names = BTreeSet::from([page::NAME.to_owned()]);
         Ok(Self { folder, options, stop, chapters: Vec::new(), names, interrupted: false })

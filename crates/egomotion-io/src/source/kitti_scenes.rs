@@ -3,7 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{Clock, KITTI_INTERVAL_S, Layout, Recognised, Sequence, TruthMaps, listing};
+use super::{
+    Clock, DisparityEncoding, KITTI_INTERVAL_S, Layout, Recognised, Sequence, TrueDisparity, TruthMaps,
+    listing,
+};
 use crate::IoError;
 use crate::calibration::{self, Calibration, CameraPair, StereoCalibration};
 
@@ -127,8 +130,10 @@ impl Set {
         let map = |place: &str| {
             Some(folder.join(place).join(format!("{scene}_{TRUTH_FRAME}.png"))).filter(|file| file.is_file())
         };
-        let disparity = map(self.disparity);
-        let next_disparity = self.next_disparity.and_then(map);
+        let true_disparity =
+            |place: &str| map(place).map(|file| TrueDisparity { file, encoding: DisparityEncoding::Kitti });
+        let disparity = true_disparity(self.disparity);
+        let next_disparity = self.next_disparity.and_then(true_disparity);
         let flow = map("flow_occ");
         let any = disparity.is_some() || next_disparity.is_some() || flow.is_some();
         any.then_some(TruthMaps { index: TRUTH_FRAME, disparity, next_disparity, flow })

@@ -43,6 +43,20 @@ fn by_key<K: Ord>(
     Ok(files)
 }
 
+/// The folders in a folder, in the order of their names.
+pub(super) fn folders(folder: &Path) -> Result<Vec<PathBuf>, IoError> {
+    let failed = |error: std::io::Error| IoError::system(folder, "list", &error);
+    let mut found = Vec::new();
+    for entry in folder.read_dir().map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.is_dir() {
+            found.push(path);
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
 /// A number written in digits alone.
 pub(super) fn digits(text: &str) -> Option<usize> {
     text.bytes().all(|b| b.is_ascii_digit()).then(|| text.parse().ok())?
