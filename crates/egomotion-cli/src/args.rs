@@ -83,7 +83,7 @@ pub struct DemoArgs {
 
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Folder of the sequence.
+    /// Folder of the sequence, an .npz of stereo tracks, or - for images piped in.
     pub source: PathBuf,
     /// Folder for the results [default: egomotion-out/NAME, NAME the last folder of SOURCE].
     #[arg(long, value_name = "DIR")]
@@ -116,6 +116,15 @@ pub struct RunArgs {
     /// YAML or XML, ROS CameraInfo, or rig.toml; raw cameras are rectified.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
+    /// With SOURCE -: raw frames of 8-bit grey levels and this size, left and right in turn [default: PNG files].
+    #[arg(long, value_name = "WxH", value_parser = frame_size)]
+    pub raw: Option<(usize, usize)>,
+    /// With SOURCE -: frames a second.
+    #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = rate)]
+    pub rate: f64,
+    /// With SOURCE -: each image holds the left one and the right one side by side.
+    #[arg(long)]
+    pub side_by_side: bool,
     /// Grey PNG of the image's size; pixels that are not black in it are never used.
     #[arg(long, value_name = "FILE")]
     pub mask: Option<PathBuf>,
@@ -371,6 +380,20 @@ pub fn positive(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) => Err("must be at least 1".into()),
         Ok(n) => Ok(n),
+        Err(e) => Err(format!("{e}")),
+    }
+}
+
+/// WxH of any positive size.
+fn frame_size(text: &str) -> Result<(usize, usize), String> {
+    let (width, height) = text.split_once(['x', 'X']).ok_or("give width x height, as 640x480")?;
+    Ok((positive(width)?, positive(height)?))
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
+        Ok(_) => Err("must be a positive number".into()),
         Err(e) => Err(format!("{e}")),
     }
 }

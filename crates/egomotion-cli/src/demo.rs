@@ -14,7 +14,6 @@ use crate::Ending;
 use crate::args::DemoArgs;
 use crate::feed::{Fetched, Given};
 use crate::judge::MapTally;
-use crate::maps::MapFiles;
 use crate::results::{About, ResultFolder};
 use crate::run::set_threads;
 use crate::session::{Outcome, Row, Session, progress, stop_signal};
@@ -41,7 +40,6 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         frames: sequence.frames(),
         mask: None,
         tracks: false,
-        maps: MapFiles::default(),
         progress: progress(sequence.frames(), args.quiet),
     };
     let mut stdout = terminal::stdout();
@@ -55,8 +53,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
     let mut verdicts = Verdicts::default();
     let outcome = session.run(
         &stop,
-        &folder,
-        |k| render(&sequence, &noise, k),
+        |k| (k < sequence.frames()).then(|| render(&sequence, &noise, k)),
         |row| {
             if row.motion.frame > 0 {
                 verdicts.add(&sequence, row);

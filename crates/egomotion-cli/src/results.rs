@@ -147,7 +147,7 @@ fn listed(scene: &SceneEntry, folder: &Path) -> Scene {
 }
 
 /// A row of `motion.csv`.
-fn motion_row(row: &Row) -> MotionRow {
+pub fn motion_row(row: &Row) -> MotionRow {
     let motion = &row.motion;
     let impact = motion.impact();
     MotionRow {

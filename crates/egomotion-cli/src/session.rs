@@ -11,23 +11,19 @@ use egomotion::pipeline::{Config, FrameMotion, Observe, StereoMotion, TrackMotio
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::feed::{Fetched, Given, with_frames};
-use crate::maps::MapFiles;
 use crate::report::{Album, FramePictures};
-use crate::results::ResultFolder;
 use crate::terminal::tell;
 
 /// What is to be run.
 pub struct Session<'a> {
     pub rig: StereoRig,
     pub config: &'a Config,
-    /// Number of frames.
+    /// Number of frames, as far as it is known.
     pub frames: usize,
     /// Pixels never to use.
     pub mask: Option<Grid<bool>>,
     /// Frames are tracks, not images.
     pub tracks: bool,
-    /// Which files of maps are written.
-    pub maps: MapFiles,
     pub progress: ProgressBar,
 }
 
@@ -35,6 +31,8 @@ pub struct Session<'a> {
 pub struct Row {
     /// Index of the frame in the source.
     pub index: usize,
+    /// That of the earlier frame it was matched with.
+    pub reference_index: Option<usize>,
     pub motion: FrameMotion,
     /// True φ over the same interval.
     pub truth: Option<Twist>,
@@ -75,98 +73,136 @@ pub fn progress(frames: usize, quiet: bool) -> ProgressBar {
 }
 
 impl Session<'_> {
-    /// Push every frame through the pipeline; `look` sees each answer with its maps.
+    /// Push every frame that `fetch` has through the pipeline; `look` sees each answer with its maps.
     pub fn run(
         &self,
         stop: &AtomicBool,
-        out: &ResultFolder,
-        fetch: impl Fn(usize) -> Fetched + Sync,
+        fetch: impl Fn(usize) -> Option<Fetched> + Sync,
         mut look: impl FnMut(&Row) -> Result<()>,
     ) -> Result<Outcome> {
-        let mut pipeline = Pipeline::new(self)?;
-        let start = Instant::now();
-        let mut tally = Tally::default();
-        let mut rows: Vec<Row> = Vec::new();
-        let mut trajectory = Trajectory::new();
-        let mut truths: Vec<Option<RigidMotion>> = Vec::new();
-        let mut reference_image: Option<(usize, Image)> = None;
-        let mut album = Album::of(self.frames);
-        with_frames(self.frames, stop, fetch, |frames| -> Result<()> {
+        let mut work = Work::new(self)?;
+        with_frames(stop, fetch, |frames| -> Result<()> {
             for fetched in frames {
-                let Fetched { index, time_s, frame, truth, decode_ms } = fetched;
-                truths.push(truth);
-                // Pictures show the maps over the image that they belong to.
-                let dense = self.config.observe == Observe::Dense;
-                let keep = match &frame {
-                    Ok(Given::Frame(frame)) if dense => Some(frame.left.clone()),
-                    _ => None,
-                };
-                let writing = Instant::now();
-                if let (Ok(Given::Frame(frame)), false) = (&frame, dense) {
-                    let width_px = album.width_px(frame.left.size());
-                    album.offer(|| FramePictures::of_image(index, rows.len() + 1, &frame.left, width_px));
-                }
-                tally.aside_ms += writing.elapsed().as_secs_f64() * 1e3;
-                let motion = pipeline.push(time_s, frame);
-                if let Err(why) = &motion.motion
-                    && *why != Unanswered::First
-                {
-                    self.progress.suspend(|| tell(format_args!("frame {index}: {why}")));
-                }
-                if let Ok(estimate) = &motion.motion
-                    && !estimate.is_complete()
-                {
-                    let free = &estimate.undetermined;
-                    self.progress.suspend(|| tell(format_args!("frame {index}: not determined: {free}")));
-                }
-                tally.add(decode_ms, &motion.stages);
-                trajectory.push(&motion);
-                let frame = motion.frame;
-                let reference = motion.reference;
-                let true_motion = reference.and_then(|r| truths[r]).zip(truth).map(|(a, b)| relative(&a, &b));
-                let mut row = Row { index, motion, truth: true_motion };
-                let writing = Instant::now();
-                let earlier = reference_image.as_ref().filter(|(f, _)| Some(*f) == reference);
-                look(&row)?;
-                if let (Some(dense), Some((r, image)), Some(dt_s)) =
-                    (&row.motion.dense, earlier, row.motion.dt_s)
-                {
-                    let index = rows.get(*r).map_or(*r, |row| row.index);
-                    let width_px = album.width_px(image.size());
-                    album.offer(|| FramePictures::new(index, rows.len(), image, dense, dt_s, width_px));
-                    if self.maps.any() {
-                        self.maps.write(out.path(), index, dense, &self.rig)?;
-                    }
-                }
-                tally.aside_ms += writing.elapsed().as_secs_f64() * 1e3;
-                // Maps are large; a long run keeps only its rows.
-                row.motion.dense = None;
-                if pipeline.reference() == Some(frame)
-                    && let Some(image) = keep
-                {
-                    reference_image = Some((frame, image));
-                }
-                rows.push(row);
-                self.progress.inc(1);
+                work.frame(fetched, &mut look)?;
             }
             Ok(())
         })?;
         self.progress.finish_and_clear();
-        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
-        let count = rows.len().max(1) as f64;
-        let first = truths.first().copied().flatten();
-        let truth: Option<Vec<RigidMotion>> =
-            truths.iter().map(|pose| Some(first?.inverse().after(&(*pose)?))).collect();
-        Ok(Outcome {
-            complete: rows.len() == self.frames,
-            rows,
-            trajectory,
-            truth,
-            album,
-            stages_ms: tally.means(count),
-            frame_ms: (wall_ms - tally.aside_ms) / count,
-            wall_s: wall_ms / 1e3,
+        Ok(work.outcome(!stop.load(Ordering::Relaxed)))
+    }
+
+    /// Say what the user should know of an answer at once.
+    fn warn(&self, index: usize, motion: &FrameMotion) {
+        let tell = |text: std::fmt::Arguments<'_>| self.progress.suspend(|| tell(text));
+        match &motion.motion {
+            Err(Unanswered::First) => {}
+            Err(why) => tell(format_args!("frame {index}: {why}")),
+            Ok(estimate) if !estimate.is_complete() => {
+                tell(format_args!("frame {index}: not determined: {}", estimate.undetermined));
+            }
+            Ok(_) => {}
+        }
+    }
+}
+
+/// A session under way.
+struct Work<'a> {
+    session: &'a Session<'a>,
+    pipeline: Pipeline,
+    rows: Vec<Row>,
+    trajectory: Trajectory,
+    truths: Vec<Option<RigidMotion>>,
+    /// The frame that the next one is matched with, and its left image: pictures show the maps over it.
+    reference: Option<(usize, Image)>,
+    album: Album,
+    tally: Tally,
+    start: Instant,
+}
+
+impl<'a> Work<'a> {
+    fn new(session: &'a Session<'a>) -> Result<Self> {
+        Ok(Self {
+            session,
+            pipeline: Pipeline::new(session)?,
+            rows: Vec::new(),
+            trajectory: Trajectory::new(),
+            truths: Vec::new(),
+            reference: None,
+            album: Album::of(session.frames),
+            tally: Tally::default(),
+            start: Instant::now(),
         })
+    }
+
+    fn frame(&mut self, fetched: Fetched, look: &mut impl FnMut(&Row) -> Result<()>) -> Result<()> {
+        let Fetched { index, time_s, frame, truth, decode_ms } = fetched;
+        let left = match &frame {
+            Ok(Given::Frame(frame)) => Some(frame.left.clone()),
+            _ => None,
+        };
+        let motion = self.pipeline.push(time_s, frame);
+        self.session.warn(index, &motion);
+        self.tally.add(decode_ms, &motion.stages);
+        self.trajectory.push(&motion);
+        self.truths.push(truth);
+        let reference = motion.reference;
+        let before = reference.and_then(|r| *self.truths.get(r)?);
+        let row = Row {
+            index,
+            reference_index: reference.and_then(|r| Some(self.rows.get(r)?.index)),
+            truth: before.zip(truth).map(|(before, after)| relative(&before, &after)),
+            motion,
+        };
+        let writing = Instant::now();
+        look(&row)?;
+        self.picture(&row, left.as_ref());
+        self.tally.aside_ms += writing.elapsed().as_secs_f64() * 1e3;
+        if self.pipeline.reference() == Some(row.motion.frame)
+            && let Some(image) = left
+        {
+            self.reference = Some((row.motion.frame, image));
+        }
+        // Maps are large; a long run keeps only its rows.
+        self.rows.push(Row { motion: FrameMotion { dense: None, ..row.motion }, ..row });
+        self.session.progress.inc(1);
+        Ok(())
+    }
+
+    /// Pictures of the frame that the maps belong to, or of the left image where there are none.
+    fn picture(&mut self, row: &Row, left: Option<&Image>) {
+        let motion = &row.motion;
+        if self.session.config.observe == Observe::Sparse {
+            if let Some(left) = left {
+                let width_px = self.album.width_px(left.size());
+                self.album.offer(|| FramePictures::of_image(row.index, self.rows.len() + 1, left, width_px));
+            }
+            return;
+        }
+        let earlier = self.reference.as_ref().filter(|(frame, _)| Some(*frame) == motion.reference);
+        if let (Some(dense), Some((_, image)), Some(dt_s), Some(index)) =
+            (&motion.dense, earlier, motion.dt_s, row.reference_index)
+        {
+            let width_px = self.album.width_px(image.size());
+            self.album.offer(|| FramePictures::new(index, self.rows.len(), image, dense, dt_s, width_px));
+        }
+    }
+
+    fn outcome(self, complete: bool) -> Outcome {
+        let wall_ms = self.start.elapsed().as_secs_f64() * 1e3;
+        let count = self.rows.len().max(1) as f64;
+        let first = self.truths.first().copied().flatten();
+        let truth: Option<Vec<RigidMotion>> =
+            self.truths.iter().map(|pose| Some(first?.inverse().after(&(*pose)?))).collect();
+        Outcome {
+            complete: complete || self.rows.len() == self.session.frames,
+            rows: self.rows,
+            trajectory: self.trajectory,
+            truth,
+            album: self.album,
+            stages_ms: self.tally.means(count),
+            frame_ms: (wall_ms - self.tally.aside_ms) / count,
+            wall_s: wall_ms / 1e3,
+        }
     }
 }
 

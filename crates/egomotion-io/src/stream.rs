@@ -29,6 +29,8 @@ pub struct ImageStream<R> {
     /// What errors call the stream.
     name: PathBuf,
     images: usize,
+    /// Where the next image begins is not known any more.
+    lost: bool,
 }
 
 /// The longest PNG that is read, in bytes: nothing larger can have at most [`read::MAX_PIXELS`] and be worth it.
@@ -37,31 +39,39 @@ const LONGEST: usize = 1 << 30;
 impl<R: Read> ImageStream<R> {
     /// The images of a stream that errors call `name`.
     pub fn new(source: R, kind: Kind, name: &Path) -> Self {
-        Self { source, kind, name: name.to_owned(), images: 0 }
+        Self { source, kind, name: name.to_owned(), images: 0, lost: false }
     }
 
     /// The next image; `None` where the stream ends between two of them.
     ///
     /// # Errors
     /// The stream cannot be read, ends inside an image, or holds something else; the number of the image is named,
-    /// from 0.
+    /// from 0. After a PNG that is whole but cannot be decoded the next one is read, after anything else nothing.
     pub fn next_image(&mut self) -> Result<Option<Image>, IoError> {
-        let image = match self.kind {
+        if self.lost {
+            return Ok(None);
+        }
+        self.lost = true;
+        let content = match self.kind {
             Kind::Png => self.next_png()?,
-            Kind::Raw { width, height } => self.next_raw(width, height)?,
+            Kind::Raw { width, height } => self.exactly(read::pixels(&self.name, width, height)?)?,
         };
-        self.images += usize::from(image.is_some());
-        Ok(image)
-    }
-
-    fn next_raw(&mut self, width: usize, height: usize) -> Result<Option<Image>, IoError> {
-        let count = read::pixels(&self.name, width, height)?;
-        let Some(levels) = self.exactly(count)? else { return Ok(None) };
-        Ok(Grid::from_values(width, height, levels.into_iter().map(f32::from).collect()))
+        self.lost = false;
+        let Some(content) = content else { return Ok(None) };
+        self.images += 1;
+        match self.kind {
+            Kind::Png => {
+                let name = format!("{} image {}", self.name.display(), self.images - 1);
+                image::decode(&content, Path::new(&name)).map(Some)
+            }
+            Kind::Raw { width, height } => {
+                Ok(Grid::from_values(width, height, content.into_iter().map(f32::from).collect()))
+            }
+        }
     }
 
     /// One PNG: its signature, then chunks up to the one called IEND.
-    fn next_png(&mut self) -> Result<Option<Image>, IoError> {
+    fn next_png(&mut self) -> Result<Option<Vec<u8>>, IoError> {
         let Some(mut content) = self.exactly(8)? else { return Ok(None) };
         if content != b"\x89PNG\r\n\x1a\n" {
             let advice = "pipe PNG files one after the other, or raw frames with --raw WxH";
@@ -79,11 +89,9 @@ impl<R: Read> ImageStream<R> {
             content.extend(head);
             content.extend(body);
             if last {
-                break;
+                return Ok(Some(content));
             }
         }
-        let name = PathBuf::from(format!("{} image {}", self.name.display(), self.images));
-        image::decode(&content, &name).map(Some)
     }
 
     /// So many bytes of an image that has begun.
@@ -139,6 +147,14 @@ mod tests {
         assert_eq!(both.next_image().unwrap().unwrap(), Image::filled(5, 3, 7.0));
         assert_eq!(both.next_image().unwrap().unwrap(), Image::filled(5, 3, 250.0));
         assert_eq!(both.next_image().unwrap(), None);
+        // A damaged image in the middle costs that image alone.
+        let mut damaged = content.clone();
+        damaged[45] ^= 0xff;
+        both = stream(&damaged, Kind::Png);
+        assert!(
+            both.next_image().unwrap_err().to_string().contains("standard input image 0: is not a whole PNG")
+        );
+        assert_eq!(both.next_image().unwrap().unwrap(), Image::filled(5, 3, 250.0));
         let raw = [1, 2, 3, 4, 5, 6, 7, 8];
         let mut raw = stream(&raw, Kind::Raw { width: 2, height: 2 });
         assert_eq!(raw.next_image().unwrap().unwrap().values(), [1.0, 2.0, 3.0, 4.0]);

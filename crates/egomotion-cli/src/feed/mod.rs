@@ -35,20 +35,19 @@ const AHEAD: usize = 2;
 
 /// Run `work` on frames that `fetch` provides on a thread of its own, in order.
 ///
-/// `stop` ends the fetching between two frames.
+/// It ends where `fetch` has no more; `stop` ends the fetching between two frames.
 pub fn with_frames<T>(
-    count: usize,
     stop: &AtomicBool,
-    fetch: impl Fn(usize) -> Fetched + Sync,
+    fetch: impl Fn(usize) -> Option<Fetched> + Sync,
     work: impl FnOnce(Receiver<Fetched>) -> T,
 ) -> T {
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(AHEAD);
         let fetch = &fetch;
         scope.spawn(move || {
-            for k in 0..count {
+            for fetched in (0..).map_while(fetch) {
                 // The receiver is gone when the work ended early.
-                if stop.load(Ordering::Relaxed) || sender.send(fetch(k)).is_err() {
+                if stop.load(Ordering::Relaxed) || sender.send(fetched).is_err() {
                     break;
                 }
             }

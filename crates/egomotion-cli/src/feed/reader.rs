@@ -16,9 +16,9 @@ use super::{Fetched, Given};
 #[derive(Debug, Default)]
 pub struct Reader<'a> {
     /// Turns raw images into rectified ones.
-    rectifier: Option<Rectifier>,
+    pub rectifier: Option<Rectifier>,
     /// Takes disparity from depth images in place of the right ones.
-    depth: Option<(DepthCamera, DepthSensor)>,
+    pub depth: Option<(DepthCamera, DepthSensor)>,
     /// Folder of disparity maps that take the place of our own.
     pub disparity: Option<&'a Path>,
     /// Folder of flow maps that take the place of our own.
