@@ -6,8 +6,8 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use egomotion::metrics;
-use egomotion::pipeline::{Config, StereoFrame, Unanswered};
 use egomotion::pipeline::stereo::DenseResults;
+use egomotion::pipeline::{Config, StereoFrame, Unanswered};
 use egomotion::sim::{SensorNoise, Sequence, StereoImages};
 
 use crate::Ending;

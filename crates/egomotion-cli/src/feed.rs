@@ -138,7 +138,8 @@ fn read_right(left: &Image, right: &Path) -> Result<Image, Unanswered> {
 fn given_disparity(folder: &Path, files: &FrameFiles) -> Result<DisparityMap, Unanswered> {
     let file = given::find(folder, &files.left, files.index, given::DISPARITY);
     let shift = given::disparity(&file.ok_or(Unanswered::MissingDisparity)?).map_err(bad)?;
-    let sigma = sigma_folder(folder).and_then(|folder| given::find(&folder, &files.left, files.index, &["pfm"]));
+    let sigma =
+        sigma_folder(folder).and_then(|folder| given::find(&folder, &files.left, files.index, &["pfm"]));
     Ok(match sigma {
         Some(sigma) => DisparityMap { shift, sigma: pfm::read(&sigma).map_err(bad)? },
         None => DisparityMap::given(shift, |_| GIVEN_SIGMA_PX),
@@ -155,9 +156,8 @@ fn given_flow(folder: &Path, files: &FrameFiles) -> Result<FlowField, Unanswered
     let file = given::find(folder, &files.left, files.index, given::FLOW);
     let [u, v] = given::flow(&file.ok_or(Unanswered::MissingFlow)?).map_err(bad)?;
     let (width, height) = u.size();
-    let both = |value: f32| {
-        Grid::from_fn(width, height, |x, y| if known(&u, &v, x, y) { value } else { f32::NAN })
-    };
+    let both =
+        |value: f32| Grid::from_fn(width, height, |x, y| if known(&u, &v, x, y) { value } else { f32::NAN });
     let variance = GIVEN_SIGMA_PX * GIVEN_SIGMA_PX;
     Ok(FlowField { cov_uu: both(variance), cov_uv: both(0.0), cov_vv: both(variance), u, v })
 }

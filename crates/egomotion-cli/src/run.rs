@@ -163,7 +163,15 @@ fn run_sequence(
     let folder = ResultFolder::create(out, args.maps)?;
     let bar = progress(frames.len(), args.quiet);
     bar.set_message(sequence.name.clone());
-    let session = Session { rig, config, frames: frames.len(), mask, tracks: tracks.is_some(), maps: args.maps, progress: bar };
+    let session = Session {
+        rig,
+        config,
+        frames: frames.len(),
+        mask,
+        tracks: tracks.is_some(),
+        maps: args.maps,
+        progress: bar,
+    };
     let mut truth_maps: Option<MapVerdict> = None;
     let mut first_failure = None;
     let outcome = session.run(

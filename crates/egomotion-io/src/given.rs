@@ -15,9 +15,10 @@ pub const FLOW: &[&str] = &["flo", "npy", "png"];
 pub fn find(folder: &Path, image: &Path, index: usize, extensions: &[&str]) -> Option<PathBuf> {
     let stem = image.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     let names = [stem.to_owned(), format!("{index:06}"), format!("{index:010}"), index.to_string()];
-    let mut files = names.iter().filter(|name| !name.is_empty()).flat_map(|name| {
-        extensions.iter().map(move |extension| folder.join(format!("{name}.{extension}")))
-    });
+    let mut files = names
+        .iter()
+        .filter(|name| !name.is_empty())
+        .flat_map(|name| extensions.iter().map(move |extension| folder.join(format!("{name}.{extension}"))));
     files.find(|file| file.is_file())
 }
 

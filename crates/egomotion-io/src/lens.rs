@@ -82,7 +82,9 @@ mod tests {
         let rig = StereoRig::new(50.0, (9.5, 7.5), 0.1, (20, 16)).unwrap();
         let image = Grid::from_fn(20, 16, |u, v| (u * u + 3 * v) as f32);
         let none = Lens { radial: [0.0; 3], tangential: [0.0; 2] };
-        assert!(none.image(&rig, &image).values().iter().zip(image.values()).all(|(a, b)| (a - b).abs() < 1e-3));
+        assert!(
+            none.image(&rig, &image).values().iter().zip(image.values()).all(|(a, b)| (a - b).abs() < 1e-3)
+        );
         // A cubic reproduces a parabola between its pixels.
         assert!((cubic(&image, 4.25, 6.5) - (4.25 * 4.25 + 19.5)).abs() < 1e-4);
     }

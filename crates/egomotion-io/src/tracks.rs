@@ -73,7 +73,8 @@ pub fn parse_csv(text: &str, path: &Path) -> Result<TrackTable, IoError> {
         if !seen.insert((frame, track)) {
             return Err(refuse(line, format!("track {track} occurs twice in frame {frame}")));
         }
-        let [ul, vl, ur, vr] = [number(places[0])?, number(places[1])?, number(places[2])?, number(places[3])?];
+        let [ul, vl, ur, vr] =
+            [number(places[0])?, number(places[1])?, number(places[2])?, number(places[3])?];
         table.frames.entry(frame).or_default().push(TrackPoint { track, left: (ul, vl), right: (ur, vr) });
         if let Some(time) = time {
             table.times_s.insert(frame, number(time)?);
@@ -164,7 +165,9 @@ mod tests {
         assert!(refused("frame,track\n").contains("t.csv:1: has no column u_left"));
         assert!(refused(head).contains("holds no track"));
         assert!(refused(&format!("{head}0,1,x,2,3,4\n")).contains("t.csv:2: \"x\" is not a number"));
-        assert!(refused(&format!("{head}0,1,1,2,3,4\n0,1,1,2,3,4\n")).contains("t.csv:3: track 1 occurs twice"));
+        assert!(
+            refused(&format!("{head}0,1,1,2,3,4\n0,1,1,2,3,4\n")).contains("t.csv:3: track 1 occurs twice")
+        );
         assert!(refused(&format!("{head}-1,1,1,2,3,4\n")).contains("t.csv:2: \"-1\" is not a whole number"));
         assert!(refused(&format!("{head}0,1,1,2\n")).contains("t.csv:2: is not CSV of one width"));
         assert!(refused(&format!("{head}99999999999,1,1,2,3,4\n")).contains("beyond"));

@@ -31,7 +31,8 @@ fn estimation(c: &mut Criterion) {
     let maps = (disparity(0), disparity(2));
     let flow = dense_flow(&before.left, &after.left, None, &config.flow).unwrap();
     let tracks = stereo_tracks(&before, &after, &rig, Hints::default(), &config.tracks);
-    let pair = DensePair { rig: &rig, before: &maps.0, after: &maps.1, flow: &flow, flow_right: None, given: false };
+    let pair =
+        DensePair { rig: &rig, before: &maps.0, after: &maps.1, flow: &flow, flow_right: None, given: false };
     let start = solve(&Observed::Sparse(&tracks), &rig, &Twist::zero(), &config).unwrap().phi();
 
     c.bench_function("dense observations", |b| {

@@ -33,7 +33,8 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
     let [l, r] = pair.cameras();
     let reason = format!("it holds image_{l} and image_{r} with numbered PNG files");
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let sequence = Sequence { name, frames, clock, rig: Some(rig), depth_sensor: None, tracks: None, truth_maps: None };
+    let sequence =
+        Sequence { name, frames, clock, rig: Some(rig), depth_sensor: None, tracks: None, truth_maps: None };
     Ok(Some((Layout::KittiOdometry, reason, vec![sequence])))
 }
 

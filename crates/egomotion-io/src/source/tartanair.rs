@@ -96,7 +96,11 @@ impl Version {
             frames,
             clock: Clock::Assumed { interval_s: INTERVAL_S },
             rig: Some(rig),
-            depth_sensor: has_depth.then_some(DepthSensor { noise: DepthNoise::exact(), levels_per_m: 1.0, lens: None }),
+            depth_sensor: has_depth.then_some(DepthSensor {
+                noise: DepthNoise::exact(),
+                levels_per_m: 1.0,
+                lens: None,
+            }),
             tracks: None,
             truth_maps: None,
         };

@@ -38,7 +38,8 @@ impl Follower<'_> {
         if self.hints.mask.is_some_and(|m| u < m.width() && v < m.height() && m.at(u, v)) {
             return None;
         }
-        let after = self.across(self.after, Time::Later, (next.u, next.v), corner.shift * scale, corner.age + 1)?;
+        let after =
+            self.across(self.after, Time::Later, (next.u, next.v), corner.shift * scale, corner.age + 1)?;
         Some(Trace { before: *corner, after, residual: next.residual })
     }
 

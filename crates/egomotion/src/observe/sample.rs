@@ -258,7 +258,14 @@ mod tests {
         flow.cov_uv = Grid::filled(width, height, 0.2499);
         flow.cov_vv = Grid::filled(width, height, 0.25);
         let rig = StereoRig::new(300.0, (5.5, 4.5), 0.1, (width, height)).unwrap();
-        let pair = DensePair { rig: &rig, before: &slanted, after: &slanted, flow: &flow, flow_right: None, given: false };
+        let pair = DensePair {
+            rig: &rig,
+            before: &slanted,
+            after: &slanted,
+            flow: &flow,
+            flow_right: None,
+            given: false,
+        };
         let tracks = pair.every(1, DensePair::stereo_track);
         assert!(tracks.len() > 40);
         for track in tracks {

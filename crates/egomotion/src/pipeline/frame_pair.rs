@@ -84,8 +84,9 @@ impl FramePair<'_> {
                 self.solver().sparse(&tracks, rough, rows, stages)
             }
             Observe::Dense => {
-                let refined =
-                    timed(&mut stages.tracks_ms, || rough.and_then(|rough| self.solver().refined(&tracks, &rough)));
+                let refined = timed(&mut stages.tracks_ms, || {
+                    rough.and_then(|rough| self.solver().refined(&tracks, &rough))
+                });
                 self.dense(&tracks, refined, space, stages)
             }
         };
@@ -175,8 +176,16 @@ impl FramePair<'_> {
             return nothing(Unanswered::Unsolvable(Unsolvable::FewRows { rows: 0, needed: 6 }));
         };
         let shaped = self.hints(None).given.is_some();
-        let pair = DensePair { rig: self.rig, before, after, flow: &flow, flow_right: right.as_ref(), given: shaped };
-        let by_shape = shaped && (self.config.method, self.config.approach) == (Method::Ml, Approach::Discrete);
+        let pair = DensePair {
+            rig: self.rig,
+            before,
+            after,
+            flow: &flow,
+            flow_right: right.as_ref(),
+            given: shaped,
+        };
+        let by_shape =
+            shaped && (self.config.method, self.config.approach) == (Method::Ml, Approach::Discrete);
         let motion = timed(&mut stages.estimate_ms, || {
             if by_shape {
                 return solve_with_shape(&pair, tracks, rough.as_ref().ok(), self.config)?.known();

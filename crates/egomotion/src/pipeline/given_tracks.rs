@@ -67,15 +67,7 @@ impl TrackMotion {
             return Err(ConfigError::SparseDepthChange.into());
         }
         let config = Config { observe: Observe::Sparse, ..config };
-        Ok(Self {
-            rig,
-            config,
-            frames: 0,
-            last_time_s: None,
-            reference: None,
-            velocity: None,
-            failures: 0,
-        })
+        Ok(Self { rig, config, frames: 0, last_time_s: None, reference: None, velocity: None, failures: 0 })
     }
 
     /// The frame that the next one will be compared with.
@@ -107,7 +99,8 @@ impl TrackMotion {
             return self.skip(time_s, Unanswered::BadTime);
         }
         self.last_time_s = Some(time_s);
-        let finite = |p: &&TrackPoint| [p.left.0, p.left.1, p.right.0, p.right.1].iter().all(|c| c.is_finite());
+        let finite =
+            |p: &&TrackPoint| [p.left.0, p.left.1, p.right.0, p.right.1].iter().all(|c| c.is_finite());
         let mut points: HashMap<u64, TrackPoint> =
             points.iter().filter(finite).map(|point| (point.track, *point)).collect();
         let Some(before) = self.reference.take() else {
@@ -120,7 +113,8 @@ impl TrackMotion {
         let fresh = points.keys().filter(|track| before.points.contains_key(track)).count();
         if shared > 0 && fresh == 0 {
             // New tracks tell of a time that the old ones do not reach: the motion up to it is lost.
-            let mut answer = FrameMotion { reference: Some(before.frame), ..self.skip(time_s, Unanswered::RepeatedFrame) };
+            let mut answer =
+                FrameMotion { reference: Some(before.frame), ..self.skip(time_s, Unanswered::RepeatedFrame) };
             answer.dt_s = Some(time_s - before.time_s);
             self.reference = Some(match points.is_empty() {
                 true => before,
@@ -135,8 +129,11 @@ impl TrackMotion {
         let mut stages = StageTimes::default();
         let dt_s = after.time_s - before.time_s;
         let prior = self.velocity.map(|velocity| velocity.scaled(dt_s));
-        let mut pairs: Vec<(&TrackPoint, &TrackPoint)> =
-            before.points.iter().filter_map(|(track, point)| Some((point, after.points.get(track)?))).collect();
+        let mut pairs: Vec<(&TrackPoint, &TrackPoint)> = before
+            .points
+            .iter()
+            .filter_map(|(track, point)| Some((point, after.points.get(track)?)))
+            .collect();
         // The order of a hash map is not the same twice.
         pairs.sort_by_key(|(point, _)| point.track);
         let tracks: Vec<StereoTrack> = pairs
@@ -182,9 +179,15 @@ impl TrackMotion {
         let (variance, aspect) = (PLACE_SIGMA_PX * PLACE_SIGMA_PX, self.rig.aspect());
         // d = u_left − u_right shares the left one's error.
         let cov = Matrix3::new(
-            variance, 0.0, variance, //
-            0.0, 0.5 * variance * aspect * aspect, 0.0, //
-            variance, 0.0, 2.0 * variance,
+            variance,
+            0.0,
+            variance, //
+            0.0,
+            0.5 * variance * aspect * aspect,
+            0.0, //
+            variance,
+            0.0,
+            2.0 * variance,
         );
         Gaussian { mean: Vector3::new(x, y, d), cov }
     }

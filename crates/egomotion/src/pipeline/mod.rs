@@ -18,9 +18,9 @@ pub mod trajectory;
 pub mod unanswered;
 
 pub use config::{Approach, Config, ConfigError, EstimatorKind, Method, Observe};
+pub use frame::{Frame, StereoFrame};
 pub use given_tracks::{TrackMotion, TrackPoint};
 pub use groups::MovingGroup;
-pub use frame::{Frame, StereoFrame};
 pub use rgbd::{DepthCamera, DepthNoise, RgbdMotion};
 pub use stereo::{FrameMotion, StereoMotion};
 pub use trajectory::Trajectory;

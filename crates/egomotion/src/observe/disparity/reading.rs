@@ -71,7 +71,9 @@ impl DisparityMap {
     pub fn given(shift: Field, sigma_px: impl Fn(f32) -> f32) -> Self {
         let (width, height) = shift.size();
         let sigma = Grid::from_fn(width, height, |u, v| {
-            shift.get(u, v).map_or(f32::NAN, |d| sigma_px(d).hypot(0.5 * jump(&shift, (u, v), d, sigma_px(d))))
+            shift
+                .get(u, v)
+                .map_or(f32::NAN, |d| sigma_px(d).hypot(0.5 * jump(&shift, (u, v), d, sigma_px(d))))
         });
         Self { sigma: Field::from_grid(sigma), shift }
     }
