@@ -139,3 +139,57 @@ fn depth_velocity_scene_flow_2015() {
         assert_eq!(&scene["truth_maps"], maps);
     }
 }
+
+/// Against the source's own poses: root mean square in millimetres and degrees, and all rows answered.
+fn errors(name: &str, options: &[&str]) -> Option<(f64, f64)> {
+    let folder = data(name)?;
+    let out = TempDir::new().unwrap();
+    run(&folder, out.path(), options);
+    let summary: Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("summary.json")).unwrap()).unwrap();
+    let counts = summary["counts"].as_object().unwrap();
+    assert_eq!(counts.keys().collect::<Vec<_>>(), ["ok"], "{summary}");
+    let truth = &summary["truth"];
+    Some((1e3 * truth["t_rmse_m"].as_f64().unwrap(), truth["r_rmse_deg"].as_f64().unwrap()))
+}
+
+/// Bounds: DIFODO (range flow) 2.2 mm and .38°, 3.7 mm and .50°; most of the rotation is the truth's own noise.
+#[test]
+fn a_depth_camera_tum() {
+    for (name, t_mm, r_deg) in [("freiburg1_desk", 2.2, 0.38), ("freiburg1_rpy", 3.5, 0.46)] {
+        let Some((t, r)) = errors(&format!("tum_rgbd/{name}"), &["--quiet"]) else { continue };
+        assert!(t <= t_mm && r <= r_deg, "{name}: {t} mm, {r}°");
+    }
+}
+
+/// Exact truth; bounds are twice what was measured when this was written, far below OpenCV's Odometry (bench/rgbd.py).
+#[test]
+fn rendered_flights_tartanair() {
+    for (name, options, t_mm, r_deg) in [
+        ("tartanair_v1/P", ["--quiet", "--sensor", "depth"], 0.2, 0.0022),
+        ("tartanair_v2/P000", ["--quiet", "--sensor", "depth"], 0.7, 0.003),
+        ("tartanair_v2/P000", ["--quiet", "--sensor", "stereo"], 0.45, 0.007),
+    ] {
+        let Some((t, r)) = errors(name, &options) else { continue };
+        assert!(t <= t_mm && r <= r_deg, "{name} {options:?}: {t} mm, {r}°");
+    }
+}
+
+/// Bounds: the best that was known, 1.60 % and .0116 °/m.
+#[test]
+fn tracks_of_others_kitti_0027() {
+    let Some(folder) = data("kitti_feature_tracks") else { return };
+    let out = TempDir::new().unwrap();
+    run(&folder, out.path(), &["--quiet"]);
+    let summary: Value =
+        serde_json::from_slice(&std::fs::read(out.path().join("summary.json")).unwrap()).unwrap();
+    assert!(summary["counts"]["repeated_frame"].as_u64().unwrap() > 85, "{summary}");
+    let estimate = out.path().join("trajectory_kitti.txt");
+    let truth = folder.join("poses_0027.txt");
+    let report = egomotion(&["evaluate", estimate.to_str().unwrap(), truth.to_str().unwrap(), "--json"]);
+    let report: Value = serde_json::from_str(&report).unwrap();
+    for (key, bound) in [("drift_percent", 1.6), ("drift_deg_per_m", 0.0120)] {
+        let value = report[key].as_f64().unwrap();
+        assert!(value <= bound, "{key} is {value}, above {bound}: {report}");
+    }
+}

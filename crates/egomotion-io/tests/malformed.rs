@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
 
 use ::image as image_crate;
@@ -11,13 +12,35 @@ use egomotion_io::calibration::{
 };
 use egomotion_io::motion_table::{self, Motion, MotionRow};
 use egomotion_io::trajectory::{self, Pose};
-use egomotion_io::{IoError, disparity_png, flo, flow_png, image, pfm, stream};
+use egomotion_io::{IoError, depth, disparity_png, flo, flow_png, image, npy, pfm, stream, tracks};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// What a reader makes of some content; an answer is as good as an error.
 type Reader = fn(&[u8], &Path) -> Result<(), IoError>;
+
+/// A `.npy` of f64 as NumPy writes it.
+fn npy_file(shape: &[usize]) -> Vec<u8> {
+    let sides: String = shape.iter().map(|side| format!("{side}, ")).collect();
+    let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({sides}), }}\n");
+    let count: usize = shape.iter().product();
+    let values: Vec<u8> = (0..count).flat_map(|i| (i as f64).to_le_bytes()).collect();
+    [b"\x93NUMPY\x01\x00", (head.len() as u16).to_le_bytes().as_slice(), head.as_bytes(), &values].concat()
+}
+
+/// An `.npz` with tracks.
+fn npz_file() -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    for (name, shape) in
+        [("features", vec![4, 5, 3]), ("K", vec![3, 3]), ("b", vec![1]), ("time_stamps", vec![3])]
+    {
+        let options = zip::write::SimpleFileOptions::default();
+        archive.start_file(format!("{name}.npy"), options).unwrap();
+        archive.write_all(&npy_file(&shape)).unwrap();
+    }
+    archive.finish().unwrap().into_inner()
+}
 
 /// A good file of every kind, its reader, and whether the reader must refuse every cut of it.
 fn kinds() -> Vec<(&'static str, Vec<u8>, Reader, bool)> {
@@ -59,6 +82,21 @@ fn kinds() -> Vec<(&'static str, Vec<u8>, Reader, bool)> {
             written(&|p| flow_png::write(p, &[field(), field()]).unwrap()),
             |c, p| flow_png::decode(c, p).map(drop),
             true,
+        ),
+        (
+            "depth.png",
+            written(&|p| disparity_png::write(p, &field()).unwrap()),
+            |c, p| depth::decode_png(c, 5000.0, p).map(drop),
+            true,
+        ),
+        ("a.npy", npy_file(&[3, 4, 2]), |c, p| npy::decode(c, p).map(drop), true),
+        ("t.npz", npz_file(), |c, p| tracks::decode_npz(c, p).map(drop), true),
+        (
+            "t.csv",
+            b"frame,track,u_left,v_left,u_right,v_right,time_s\n0,1,2.5,3,1,3,0.1\n1,1,2.6,3,1.2,3,0.2\n"
+                .to_vec(),
+            |c, p| tracks::parse_csv(&String::from_utf8_lossy(c), p).map(drop),
+            false,
         ),
         (
             "m.pfm",

@@ -8,6 +8,7 @@ mod combinations;
 mod demo;
 mod evaluate;
 mod gaps;
+mod given;
 mod impact;
 mod info;
 mod interrupt;

@@ -3,7 +3,8 @@
 //! Depth and grey levels come from two sensors that never see quite the same moment, and blur and rolling shutters
 //! spoil one more than the other. How far each is from what it claims is seen in its own residuals, and each is
 //! weighed by that: places by where points are found off the motion's prediction, disparities by what the later map
-//! says there.
+//! says there. Windows of flow overlap, so that a pixel's place tells little beside its neighbours': against shape,
+//! which does not overlap as much, it counts by the area over which its error is the same.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -38,8 +39,7 @@ pub(super) fn solve_with_shape(
     start: Option<&Twist>,
     config: &Config,
 ) -> Result<MotionEstimate, Unsolvable> {
-    let mut tracked = pair.every(config.sample_step_px, DensePair::stereo_track);
-    tracked.extend_from_slice(corners);
+    let tracked = Tracked { flow: pair.every(config.sample_step_px, DensePair::stereo_track), corners };
     let mut phi = start.copied().unwrap_or_else(Twist::zero);
     let mut reach = if start.is_some() { OTHER_SURFACE_PX.1 } else { OTHER_SURFACE_PX.0 };
     let mut round = 0;
@@ -59,10 +59,16 @@ pub(super) fn solve_with_shape(
     }
 }
 
+/// Points whose places were found in both images.
+struct Tracked<'a> {
+    flow: Vec<StereoTrack>,
+    corners: &'a [StereoTrack],
+}
+
 /// Everything that is known about a motion near the given one, each source with the noise that it shows.
 fn observations(
     pair: &DensePair<'_>,
-    tracked: &[StereoTrack],
+    tracked: &Tracked<'_>,
     motion: &RigidMotion,
     reach_px: f64,
     config: &Config,
@@ -73,11 +79,21 @@ fn observations(
     });
     let squares = shapes.iter().filter_map(|(track, _)| across_surface(track, pair.rig, motion));
     let disparity = factor(squares.collect(), MEDIAN_1);
-    let squares = tracked.iter().filter_map(|track| along_surface(track, pair.rig, motion));
-    let place = factor(squares.collect(), MEDIAN_2);
-    let shapes =
-        shapes.iter().filter(|(_, tracked)| !tracked).map(|(track, _)| scaled(track, 1.0, disparity));
-    tracked.iter().map(|track| scaled(track, place, disparity)).chain(shapes).collect()
+    let place = |tracks: &[StereoTrack]| {
+        let squares = tracks.iter().filter_map(|track| along_surface(track, pair.rig, motion));
+        factor(squares.collect(), MEDIAN_2)
+    };
+    let (by_flow, by_corners) = (place(&tracked.flow) * overlap(config), place(tracked.corners));
+    let flow = tracked.flow.iter().map(|track| scaled(track, by_flow, disparity));
+    let corners = tracked.corners.iter().map(|track| scaled(track, by_corners, disparity));
+    let elsewhere = shapes.iter().filter(|(_, tracked)| !tracked);
+    flow.chain(corners).chain(elsewhere.map(|(track, _)| scaled(track, 1.0, disparity))).collect()
+}
+
+/// How many of the sampled pixels share the error of one pixel's flow.
+fn overlap(config: &Config) -> f64 {
+    let step = config.sample_step_px as f64;
+    (f64::from(config.flow.correlation_area_px()) / (step * step)).max(1.0)
 }
 
 /// By how much variances are larger than stated.
