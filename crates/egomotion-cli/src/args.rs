@@ -284,8 +284,8 @@ pub struct EvaluateArgs {
     #[arg(long, value_name = "S", default_value_t = 0.01)]
     pub max_diff: f64,
     /// The truth's own standard deviation from frame to frame, in metres and degrees, for judging the stated one.
-    #[arg(long, value_name = "M,DEG", value_delimiter = ',', num_args = 2)]
-    pub truth_sigma: Option<Vec<f64>>,
+    #[arg(long, value_name = "M,DEG", value_parser = two)]
+    pub truth_sigma: Option<(f64, f64)>,
     /// Print as JSON.
     #[arg(long)]
     pub json: bool,
@@ -294,9 +294,8 @@ pub struct EvaluateArgs {
 impl EvaluateArgs {
     /// Of each component of φ, in metres and radians.
     pub fn truth_sigma(&self) -> [f64; 6] {
-        let given =
-            |k: usize| self.truth_sigma.as_ref().and_then(|sigma| sigma.get(k)).copied().unwrap_or(0.0);
-        let (t, r) = (given(0), given(1).to_radians());
+        let (t, degrees) = self.truth_sigma.unwrap_or_default();
+        let r = degrees.to_radians();
         [t, t, t, r, r, r]
     }
 }
@@ -388,6 +387,16 @@ pub fn positive(text: &str) -> Result<usize, String> {
 fn frame_size(text: &str) -> Result<(usize, usize), String> {
     let (width, height) = text.split_once(['x', 'X']).ok_or("give width x height, as 640x480")?;
     Ok((positive(width)?, positive(height)?))
+}
+
+/// Two numbers that are not negative.
+fn two(text: &str) -> Result<(f64, f64), String> {
+    let (a, b) = text.split_once(',').ok_or("give two numbers, as 0.001,0.02")?;
+    let number = |text: &str| match text.trim().parse::<f64>() {
+        Ok(number) if number.is_finite() && number >= 0.0 => Ok(number),
+        _ => Err(format!("{text} is not a number that is not negative")),
+    };
+    Ok((number(a)?, number(b)?))
 }
 
 fn rate(text: &str) -> Result<f64, String> {

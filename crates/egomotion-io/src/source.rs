@@ -9,6 +9,7 @@ mod kitti_scenes;
 mod listing;
 mod middlebury;
 mod moments;
+mod plain;
 mod stamped_poses;
 mod tartanair;
 mod true_disparity;
@@ -66,6 +67,8 @@ pub enum Layout {
     FeatureTracks,
     /// Pairs without a second time, as in the Middlebury sets.
     StereoPairs,
+    /// Folders `left` and `right`, or images and `depth`, or images side by side, and a calibration.
+    Plain,
 }
 
 /// The depth camera of a sequence, whose depth images lie on the left image's pixels.
@@ -97,6 +100,8 @@ pub struct Sequence {
     pub rectification: Option<StereoRectification>,
     /// What took the depth images; `None` where the layout has none.
     pub depth_sensor: Option<DepthSensor>,
+    /// Whether each image file holds the left image and the right one side by side.
+    pub side_by_side: bool,
     /// File of stereo tracks in place of images, for [`crate::tracks`].
     pub tracks: Option<PathBuf>,
     /// True maps, where the layout has them.
@@ -113,6 +118,7 @@ impl Sequence {
             rig,
             rectification: None,
             depth_sensor: None,
+            side_by_side: false,
             tracks: None,
             truth_maps: None,
         }
@@ -168,7 +174,8 @@ const KNOWN: &str = "known layouts: KITTI odometry (image_0, image_1 or image_2,
                      KITTI 2012 and 2015 scenes (training/ with image_0, image_1 or image_2, image_3), \
                      EuRoC and TUM-VI (mav0/cam0, mav0/cam1), \
                      TUM RGB-D (rgb.txt, depth.txt), TartanAir (image_lcam_front or image_left), \
-                     stereo tracks (one .npz with features, K, b)";
+                     stereo tracks (one .npz with features, K, b), stereo pairs (im2, im6 …), \
+                     a plain folder (left, right or rgb, depth, and rig.toml)";
 
 /// Interval of the KITTI cameras, assumed where there are no time stamps, in seconds.
 const KITTI_INTERVAL_S: f64 = 0.1;
@@ -212,6 +219,7 @@ impl Source {
             tartanair::recognise,
             feature_tracks::recognise,
             middlebury::recognise,
+            plain::recognise,
         ] {
             recognised = layout(&folder, calibration)?;
             if recognised.is_some() {
@@ -228,7 +236,13 @@ type Recognised = (Layout, String, Vec<Sequence>);
 
 fn unknown(path: &Path, folder: &Path) -> IoError {
     let empty = folder.read_dir().is_ok_and(|mut entries| entries.next().is_none());
-    let reason = if empty { "is an empty folder" } else { "has no layout that is known" };
+    let reason = if empty {
+        "is an empty folder"
+    } else if plain::holds_images_only(folder) {
+        "holds images of one camera: depth needs a second one, or depth images"
+    } else {
+        "has no layout that is known"
+    };
     IoError::new(path, reason, KNOWN)
 }
 
@@ -254,6 +268,7 @@ impl fmt::Display for Layout {
             Self::TartanAirV2 => "TartanAir 2",
             Self::FeatureTracks => "stereo tracks",
             Self::StereoPairs => "stereo pairs",
+            Self::Plain => "plain folder",
         })
     }
 }

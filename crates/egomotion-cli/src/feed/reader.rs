@@ -19,6 +19,8 @@ pub struct Reader<'a> {
     pub rectifier: Option<Rectifier>,
     /// Takes disparity from depth images in place of the right ones.
     pub depth: Option<(DepthCamera, DepthSensor)>,
+    /// Each file holds both images.
+    pub side_by_side: bool,
     /// Folder of disparity maps that take the place of our own.
     pub disparity: Option<&'a Path>,
     /// Folder of flow maps that take the place of our own.
@@ -39,6 +41,7 @@ impl Reader<'_> {
         Self {
             rectifier: sequence.rectification.as_ref().map(Rectifier::new),
             depth: sensor.and_then(camera),
+            side_by_side: sequence.side_by_side,
             ..Self::default()
         }
     }
@@ -88,6 +91,11 @@ impl Reader<'_> {
             let frame = camera.frame(time_s, left, &depth_m);
             return Ok(Frame { disparity: given.or(frame.disparity), flow, ..frame });
         }
+        if self.side_by_side {
+            let whole = image::read(&files.left).map_err(bad)?;
+            let (left, right) = self.rectified(halves(&whole), &files.left, &files.left)?;
+            return Ok(Frame { time_s, left, right: Some(right), disparity: given, flow });
+        }
         let (left, right) = match (&files.right, &given) {
             (Some(right), _) => self.images(files, right).map(|(left, right)| (left, Some(right)))?,
             (None, Some(_)) => (self.left(files)?, None),
@@ -107,13 +115,18 @@ impl Reader<'_> {
                 right.display()
             )));
         }
-        match &self.rectifier {
-            None => Ok((left_image, right_image)),
-            Some(rectifier) => Ok((
-                rectified(rectifier.left(), left_image, &files.left)?,
-                rectified(rectifier.right(), right_image, right)?,
-            )),
-        }
+        self.rectified((left_image, right_image), &files.left, right)
+    }
+
+    /// Both images on the rig's grid.
+    fn rectified(
+        &self,
+        (left, right): (Image, Image),
+        left_path: &Path,
+        right_path: &Path,
+    ) -> Result<(Image, Image), Unanswered> {
+        let Some(rectifier) = &self.rectifier else { return Ok((left, right)) };
+        Ok((rectified(rectifier.left(), left, left_path)?, rectified(rectifier.right(), right, right_path)?))
     }
 
     fn left(&self, files: &FrameFiles) -> Result<Image, Unanswered> {
@@ -123,6 +136,13 @@ impl Reader<'_> {
             Some(rectifier) => rectified(rectifier.left(), image, &files.left),
         }
     }
+}
+
+/// The left and the right half of an image.
+pub fn halves(whole: &Image) -> (Image, Image) {
+    let (width, height) = (whole.width() / 2, whole.height());
+    let half = |from: usize| Grid::from_fn(width, height, |u, v| whole.at(from + u, v));
+    (half(0), half(width))
 }
 
 fn rectified(map: &RectificationMap, raw: Image, path: &Path) -> Result<Image, Unanswered> {

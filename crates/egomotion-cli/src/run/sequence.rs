@@ -101,7 +101,7 @@ pub fn run_sequence(
 fn check_sensor(args: &RunArgs, sequence: &Sequence) -> Result<()> {
     let (has, wanted) = match args.sensor {
         Some(SensorArg::Depth) => (sequence.depth_sensor.is_some(), "depth images"),
-        Some(SensorArg::Stereo) => (sequence.frames.iter().any(|f| f.right.is_some()), "right images"),
+        Some(SensorArg::Stereo) => (has_right(sequence), "right images"),
         None => return Ok(()),
     };
     if has { Ok(()) } else { Err(Usage(format!("{}: has no {wanted}", args.source.display())).into()) }
@@ -109,11 +109,14 @@ fn check_sensor(args: &RunArgs, sequence: &Sequence) -> Result<()> {
 
 /// Whether depth images take the place of right ones: where there are no others, or as the user says.
 fn uses_depth(args: &RunArgs, sequence: &Sequence) -> bool {
-    let has_right = sequence.frames.iter().any(|frame| frame.right.is_some());
     match args.sensor {
         Some(sensor) => sensor == SensorArg::Depth,
-        None => !has_right,
+        None => !has_right(sequence),
     }
+}
+
+fn has_right(sequence: &Sequence) -> bool {
+    sequence.side_by_side || sequence.frames.iter().any(|frame| frame.right.is_some())
 }
 
 /// What the report should say besides.

@@ -14,7 +14,7 @@ use egomotion_io::stream::{ImageStream, Kind};
 use serde_json::{Value, json};
 
 use crate::args::RunArgs;
-use crate::feed::{Fetched, Given};
+use crate::feed::{Fetched, Given, halves};
 use crate::results::{About, ResultFolder, motion_row};
 use crate::session::{Row, Session, progress, stop_signal};
 use crate::summary::Summary;
@@ -106,9 +106,7 @@ impl<R: Read> Pairs<R> {
         if !self.side_by_side {
             return Ok(self.images.next_image()?.map(|right| (first, right)));
         }
-        let (width, height) = (first.width() / 2, first.height());
-        let half = |from: usize| Grid::from_fn(width, height, |u, v| first.at(from + u, v));
-        Ok(Some((half(0), half(width))))
+        Ok(Some(halves(&first)))
     }
 }
 

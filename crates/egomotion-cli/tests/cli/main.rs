@@ -20,5 +20,6 @@ mod recording;
 mod selection;
 mod settings;
 mod simulate;
+mod sources;
 mod study;
 mod table;

@@ -20,7 +20,16 @@ pub(super) fn texts<K: Ord>(
     folder: &Path,
     key: impl Fn(&str) -> Option<K>,
 ) -> Result<BTreeMap<K, PathBuf>, IoError> {
-    by_key(folder, key, |path| path.extension() == Some(OsStr::new("txt")))
+    ending(folder, &["txt"], key)
+}
+
+/// The files of a folder with one of some endings in the same way.
+pub(super) fn ending<K: Ord>(
+    folder: &Path,
+    endings: &[&str],
+    key: impl Fn(&str) -> Option<K>,
+) -> Result<BTreeMap<K, PathBuf>, IoError> {
+    by_key(folder, key, |path| path.extension().and_then(OsStr::to_str).is_some_and(|e| endings.contains(&e)))
 }
 
 fn by_key<K: Ord>(

@@ -57,6 +57,11 @@ impl DepthNoise {
         Self::StructuredLight { per_m: 1.425e-3, step_per_m: 2.85e-3 }
     }
 
+    /// Of time-of-flight cameras for rooms: 2 mm, and 1 mm more for each metre, in good light.
+    pub fn time_of_flight() -> Self {
+        Self::TimeOfFlight { constant_m: 2e-3, per_m: 1e-3 }
+    }
+
     /// Of rendered depth.
     pub fn exact() -> Self {
         Self::Exact { relative: 1e-4 }
