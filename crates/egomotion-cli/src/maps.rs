@@ -126,7 +126,7 @@ impl MapFiles {
 
 impl Shown<'_> {
     fn write(&self, format: MapFormat, file: &dyn Fn(&str) -> PathBuf) -> Result<()> {
-        Ok(match format {
+        match format {
             MapFormat::Pfm => pfm::write(&file("pfm"), self.plane)?,
             MapFormat::Npy => npy::write(&file("npy"), self.plane)?,
             // KITTI's format is of disparity; nothing else has one of 16 bits.
@@ -135,7 +135,8 @@ impl Shown<'_> {
             }
             MapFormat::Kitti => {}
             MapFormat::Colour => image::write_rgb(&file("colour.png"), &self.coloured())?,
-        })
+        }
+        Ok(())
     }
 
     /// Missing pixels are black; a hundredth of the values at either end has the colour of the end.
@@ -173,12 +174,13 @@ impl Scale {
 
 /// Flow has the formats of its own.
 fn write_flow(format: MapFormat, flow: [&Field; 2], file: &dyn Fn(&str) -> PathBuf) -> Result<()> {
-    Ok(match format {
+    match format {
         MapFormat::Pfm => flo::write(&file("flo"), &flow.map(Clone::clone))?,
         MapFormat::Npy => npy::write_flow(&file("npy"), flow)?,
         MapFormat::Kitti => flow_png::write(&file("png"), &flow.map(Clone::clone))?,
         MapFormat::Colour => image::write_rgb(&file("colour.png"), &flow_colours(flow))?,
-    })
+    }
+    Ok(())
 }
 
 /// Direction as hue, length as saturation up to the 99th percentile; missing is black.

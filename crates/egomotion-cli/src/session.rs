@@ -225,7 +225,7 @@ impl Pipeline {
 
     fn push(&mut self, time_s: f64, given: Result<Given, Unanswered>) -> FrameMotion {
         match (self, given) {
-            (Self::Images(images), Ok(Given::Frame(frame))) => images.push(frame),
+            (Self::Images(images), Ok(Given::Frame(frame))) => images.push(*frame),
             (Self::Tracks(tracks), Ok(Given::Tracks(points))) => tracks.push(time_s, &points),
             (Self::Images(images), given) => images.skip(time_s, reason(given)),
             (Self::Tracks(tracks), given) => tracks.skip(time_s, reason(given)),

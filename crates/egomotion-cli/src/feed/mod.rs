@@ -25,7 +25,7 @@ pub struct Fetched {
 /// What is given of one time.
 pub enum Given {
     /// Images, and perhaps maps.
-    Frame(Frame),
+    Frame(Box<Frame>),
     /// Points of tracks that others made.
     Tracks(Vec<TrackPoint>),
 }

@@ -66,7 +66,7 @@ impl Reader<'_> {
         let start = Instant::now();
         let frame = match self.tracks {
             Some(table) => Ok(Given::Tracks(table.frames.get(&files.index).cloned().unwrap_or_default())),
-            None => self.frame(files, time_s, last).map(Given::Frame),
+            None => self.frame(files, time_s, last).map(|frame| Given::Frame(Box::new(frame))),
         };
         Fetched {
             index: files.index,

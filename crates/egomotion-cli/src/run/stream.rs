@@ -60,7 +60,13 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
                 Ok(StereoFrame { time_s, left, right }.into())
             },
         );
-        Some(Fetched { index: k, time_s, frame: frame.map(Given::Frame), truth: None, decode_ms: 0.0 })
+        Some(Fetched {
+            index: k,
+            time_s,
+            frame: frame.map(|frame| Given::Frame(Box::new(frame))),
+            truth: None,
+            decode_ms: 0.0,
+        })
     };
     let outcome = session.run(&stop, fetch, |row| {
         let mut stdout = terminal::stdout();

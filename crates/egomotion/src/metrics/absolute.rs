@@ -55,7 +55,9 @@ pub fn align(estimate: &[RigidMotion], truth: &[RigidMotion], alignment: Alignme
     }
     let svd = cov.svd(true, true);
     let (u, v_t, d) = (svd.u?, svd.v_t?, svd.singular_values);
-    if !(d[1] > f64::EPSILON * d[0].max(1.0)) {
+    // Nothing that is not a number either.
+    let spread = d[1] > f64::EPSILON * d[0].max(1.0);
+    if !spread {
         return None;
     }
     // A reflection is no rotation: then the least singular direction is turned over.

@@ -27,9 +27,8 @@ impl DensePair<'_> {
         motion: &RigidMotion,
         reach_px: f64,
     ) -> Option<StereoTrack> {
-        let (d, variance) = self.disparity(u, v)?;
-        let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
-        let before = Gaussian::independent([x, y, d], [0.0, 0.0, variance]);
+        let before = self.before(u, v)?;
+        let variance = before.cov.m33;
         let led = self.rig.project(&motion.apply(&self.rig.point(&before.mean)?))?;
         let (later_u, later_v) = self.rig.pixel_from_image(led.x, led.y);
         let reading = self.after.read(later_u, later_v)?;

@@ -57,9 +57,13 @@ impl DensePair<'_> {
     }
 
     /// (x, y, d) at t with its covariance: the pixel is exact, disparity is measured.
-    fn before(&self, u: usize, v: usize) -> Option<Gaussian<3>> {
-        let (d, variance) = self.disparity(u, v)?;
+    pub(super) fn before(&self, u: usize, v: usize) -> Option<Gaussian<3>> {
+        let (mut d, mut variance) = self.disparity(u, v)?;
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
+        if self.given {
+            let (surface, _) = surface_at(self.rig, self.before, x, y)?;
+            (d, variance) = (surface.value(), surface.variance());
+        }
         Some(Gaussian::independent([x, y, d], [0.0, 0.0, variance]))
     }
 
@@ -116,7 +120,10 @@ impl DensePair<'_> {
     /// d′ is read where flow says, so an error of flow moves it along the map's slope.
     #[inline(always)]
     fn later(&self, x: f64, y: f64, place: &Matrix2<f64>) -> Option<(Gaussian<1>, Vector2<f64>)> {
-        let (later, gradient) = disparity_at(self.rig, self.after, x, y)?;
+        let (later, gradient) = match self.given {
+            true => surface_at(self.rig, self.after, x, y)?,
+            false => disparity_at(self.rig, self.after, x, y)?,
+        };
         let shared = if self.given { 0.0 } else { shared_variance(place, later.variance()) };
         let own = Vector2::new(shared, 0.0);
         let slope = place * gradient;
@@ -237,6 +244,16 @@ fn disparity_at(rig: &StereoRig, map: &DisparityMap, x: f64, y: f64) -> Option<(
     let on_surface = gradient.amax() < 1.0;
     let measured = sigma < f64::from(GUESS_SIGMA_PX);
     (d > 0.0 && on_surface && measured).then(|| (Gaussian::scalar(d, sigma * sigma), gradient))
+}
+
+/// The same of a given map, by the surface around: what is given need not be smooth.
+fn surface_at(rig: &StereoRig, map: &DisparityMap, x: f64, y: f64) -> Option<(Gaussian<1>, Vector2<f64>)> {
+    let (u, v) = rig.pixel_from_image(x, y);
+    let reading = map.read(u, v)?;
+    let d = rig.disparity_from_shift(reading.shift);
+    let measured = reading.variance < f64::from(GUESS_SIGMA_PX).powi(2);
+    let gradient = Vector2::new(reading.slope.0, reading.slope.1 / rig.aspect());
+    (d > 0.0 && measured).then(|| (Gaussian::scalar(d, reading.variance), gradient))
 }
 
 #[cfg(test)]
