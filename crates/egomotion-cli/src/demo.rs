@@ -89,7 +89,9 @@ fn render(sequence: &Sequence, noise: &SensorNoise, k: usize) -> Fetched {
         index: k,
         time_s,
         frame: images
-            .map(|StereoImages { left, right }| Given::Frame(Box::new(StereoFrame { time_s, left, right }.into())))
+            .map(|StereoImages { left, right }| {
+                Given::Frame(Box::new(StereoFrame { time_s, left, right }.into()))
+            })
             .ok_or(Unanswered::First),
         truth: sequence.world_from_left(k),
         decode_ms: start.elapsed().as_secs_f64() * 1e3,
