@@ -153,10 +153,10 @@ fn errors(name: &str, options: &[&str]) -> Option<(f64, f64)> {
     Some((1e3 * truth["t_rmse_m"].as_f64().unwrap(), truth["r_rmse_deg"].as_f64().unwrap()))
 }
 
-/// Bounds: DIFODO (range flow) 2.2 mm and .38°, 3.7 mm and .50°; most of the rotation is the truth's own noise.
+/// Bounds: DIFODO's (range flow), 2.2 mm and .38°, 3.7 mm and .50°; most of the rotation is the truth's own noise.
 #[test]
 fn a_depth_camera_tum() {
-    for (name, t_mm, r_deg) in [("freiburg1_desk", 2.2, 0.38), ("freiburg1_rpy", 3.5, 0.46)] {
+    for (name, t_mm, r_deg) in [("freiburg1_desk", 2.2, 0.38), ("freiburg1_rpy", 3.7, 0.50)] {
         let Some((t, r)) = errors(&format!("tum_rgbd/{name}"), &["--quiet"]) else { continue };
         assert!(t <= t_mm && r <= r_deg, "{name}: {t} mm, {r}°");
     }
