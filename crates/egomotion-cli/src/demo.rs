@@ -14,6 +14,7 @@ use crate::Ending;
 use crate::args::DemoArgs;
 use crate::feed::{Fetched, Given};
 use crate::judge::MapTally;
+use crate::report::Eyes;
 use crate::results::{About, ResultFolder};
 use crate::run::set_threads;
 use crate::session::{Outcome, Row, Session, progress, stop_signal};
@@ -72,6 +73,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         command: "egomotion demo".into(),
         config: &config,
         rig: &sequence.rig,
+        eyes: Eyes::Stereo,
         notes: Vec::new(),
     };
     folder.write_report(&about, &outcome)?;

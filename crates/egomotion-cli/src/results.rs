@@ -11,7 +11,7 @@ use egomotion_io::write;
 use serde::Serialize;
 
 use crate::moving;
-use crate::report::{self, FrameRow, Report, Scene};
+use crate::report::{self, Eyes, FrameRow, Report, Scene};
 use crate::session::{Outcome, Row};
 use crate::summary::{Index, SceneEntry};
 
@@ -78,6 +78,7 @@ pub struct About<'a> {
     pub command: String,
     pub config: &'a Config,
     pub rig: &'a StereoRig,
+    pub eyes: Eyes,
     /// What the reader should know besides.
     pub notes: Vec<String>,
 }
@@ -105,6 +106,7 @@ impl ResultFolder {
             command: about.command.clone(),
             settings_toml: toml::to_string(about.config).context("cannot put the settings into TOML")?,
             rig: about.rig,
+            eyes: about.eyes,
             sparse: about.config.observe == Observe::Sparse,
             complete: outcome.complete,
             frames: &frames,

@@ -57,6 +57,8 @@ pub struct Report<'a> {
     pub settings_toml: String,
     /// The rig.
     pub rig: &'a StereoRig,
+    /// What the recording was made with.
+    pub eyes: Eyes,
     /// Whether corners alone were followed, so that there are no maps.
     pub sparse: bool,
     /// Whether every frame was done.
@@ -75,6 +77,17 @@ pub struct Report<'a> {
     pub frame_ms: f64,
     /// What the reader should know besides, one sentence each.
     pub notes: Vec<String>,
+}
+
+/// What a recording was made with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Eyes {
+    /// Two cameras.
+    Stereo,
+    /// One camera, and the depth of its pixels.
+    Depth,
+    /// Tracks that another program found in the images of two cameras.
+    Tracks,
 }
 
 /// What one frame says.

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::series::Series;
 use super::trajectory::Path;
-use super::{FrameRow, Report, body, impact, trouble};
+use super::{Eyes, FrameRow, Report, body, impact, trouble};
 use crate::chart::number::{Unit, count, length, significant};
 
 /// One figure: what it is, its value, and what else to know.
@@ -19,9 +19,14 @@ struct Figure {
 /// The first paragraph: how far, how fast, where to.
 pub fn lede(report: &Report<'_>) -> Markup {
     let answered = report.frames.iter().any(|row| row.motion.is_some());
+    let (eyes, one, many) = match report.eyes {
+        Eyes::Stereo => ("a pair of cameras alone", "pair of images", "pairs of images"),
+        Eyes::Depth => ("a depth camera alone", "image with depth", "images with depth"),
+        Eyes::Tracks => ("points followed in a pair of cameras", "set of points", "sets of points"),
+    };
     let what = format!(
         "{}, {} × {} pixels",
-        count(report.frames.len(), "pair of images", "pairs of images"),
+        count(report.frames.len(), one, many),
         report.rig.width_px,
         report.rig.height_px
     );
@@ -38,7 +43,7 @@ pub fn lede(report: &Report<'_>) -> Markup {
             }
         }
         p class="about" {
-            "Seen from a pair of cameras alone (" (what) "): how they moved, how near each pixel is and how fast it comes nearer, and when it would be hit – each with the range that holds the true value 95 times out of 100."
+            "Seen from " (eyes) " (" (what) "): how they moved, how near each pixel is and how fast it comes nearer, and when it would be hit – each with the range that holds the true value 95 times out of 100."
         }
     }
 }

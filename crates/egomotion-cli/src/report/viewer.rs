@@ -5,7 +5,7 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 
 use super::pictures::{FramePictures, QUANTITIES, Quantity};
-use super::{Report, Stop, outlines, player};
+use super::{Eyes, Report, Stop, outlines, player};
 use crate::chart::colour::Spread;
 use crate::chart::number::significant;
 use crate::chart::plot::Scale;
@@ -24,7 +24,8 @@ pub fn viewer(report: &Report<'_>, stops: &[Stop]) -> Markup {
             p {
                 @if pictures.is_empty() { "There are no pictures: no two good frames could be compared. " }
                 @if stops.len() > 1 { "Move the slider, press the arrow keys or touch a chart: all marks and pictures follow. " }
-                @if report.sparse { "This run followed corners alone (" code { "--observe sparse" } "), which is fast but makes no maps of every pixel." }
+                @if report.eyes == Eyes::Tracks { "The run was given points that another program followed, and no images." }
+                @else if report.sparse { "This run followed corners alone (" code { "--observe sparse" } "), which is fast but makes no maps of every pixel." }
             }
             @if maps {
                 div class="switch" role="radiogroup" aria-label="The maps show" {

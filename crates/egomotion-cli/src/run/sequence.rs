@@ -11,6 +11,7 @@ use egomotion_io::{image, tracks};
 
 use crate::args::{RunArgs, SensorArg};
 use crate::judge::{self, MapVerdict};
+use crate::report::Eyes;
 use crate::results::{About, ResultFolder};
 use crate::session::{Session, progress};
 use crate::summary::Summary;
@@ -91,6 +92,11 @@ pub fn run_sequence(
         command: terminal::command_line(),
         config,
         rig: &rig,
+        eyes: match (&tracks, uses_depth(args, sequence)) {
+            (Some(_), _) => Eyes::Tracks,
+            (None, true) => Eyes::Depth,
+            (None, false) => Eyes::Stereo,
+        },
         notes: notes(&summary),
     };
     folder.write_report(&about, &outcome)?;

@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 
 use crate::args::RunArgs;
 use crate::feed::{Fetched, Given, halves};
+use crate::report::Eyes;
 use crate::results::{About, ResultFolder, motion_row};
 use crate::session::{Row, Session, progress, stop_signal};
 use crate::summary::Summary;
@@ -84,6 +85,7 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
         command: terminal::command_line(),
         config,
         rig: &pair.rig,
+        eyes: Eyes::Stereo,
         notes: summary.warnings.clone(),
     };
     folder.write_report(&about, &outcome)?;

@@ -9,7 +9,7 @@ use egomotion::pipeline::MovingGroup;
 use nalgebra::{Matrix6, Vector6};
 
 use self::pictures::{album, dense};
-use super::{Album, FramePictures, FrameRow, Report, Scene, render, render_index};
+use super::{Album, Eyes, FramePictures, FrameRow, Report, Scene, render, render_index};
 
 /// What a report refers to.
 pub struct Run {
@@ -76,6 +76,7 @@ impl Run {
             command: "egomotion run somewhere".into(),
             settings_toml: "seed = 1".into(),
             rig: &self.rig,
+            eyes: Eyes::Stereo,
             sparse: false,
             complete: true,
             frames: &self.rows,
