@@ -25,7 +25,7 @@ fn npy_file(shape: &[usize]) -> Vec<u8> {
     let sides: String = shape.iter().map(|side| format!("{side}, ")).collect();
     let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({sides}), }}\n");
     let count: usize = shape.iter().product();
-    let values: Vec<u8> = (0..count).flat_map(|i| (i as f64).to_le_bytes()).collect();
+    let values: Vec<u8> = (0..count).flat_map(|i| (i as f64 + 1.0).to_le_bytes()).collect();
     [b"\x93NUMPY\x01\x00", (head.len() as u16).to_le_bytes().as_slice(), head.as_bytes(), &values].concat()
 }
 
