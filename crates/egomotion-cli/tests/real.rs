@@ -162,7 +162,7 @@ fn a_depth_camera_tum() {
     }
 }
 
-/// Exact truth; bounds are twice what was measured when this was written, far below OpenCV's Odometry (bench/rgbd.py).
+/// Exact truth; bounds are twice what was measured when this was written: they guard against going back.
 #[test]
 fn rendered_flights_tartanair() {
     for (name, options, t_mm, r_deg) in [

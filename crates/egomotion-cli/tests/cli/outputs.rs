@@ -157,7 +157,13 @@ fn summary_has_the_keys_of_the_contract() {
 fn without_maps_only_the_files_of_the_contract_appear() {
     let out = TempDir::new().unwrap();
     let ended = run(recording(), out.path(), "--frames 2 --observe sparse");
-    let mut expected = vec!["motion.csv", "summary.json", "trajectory_kitti.txt", "trajectory_tum.txt"];
+    let mut expected = vec![
+        "motion.csv",
+        "summary.json",
+        "trajectory_euroc.csv",
+        "trajectory_kitti.txt",
+        "trajectory_tum.txt",
+    ];
     if out.path().join("report.html").exists() {
         expected.insert(1, "report.html");
     }
