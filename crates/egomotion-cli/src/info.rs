@@ -68,11 +68,7 @@ fn print_sequence(out: &mut impl std::io::Write, sequence: &Sequence) -> Result<
         };
         writeln!(out, "  sensor    {use_of}")?;
         if let Some(lens) = &sensor.lens {
-            writeln!(
-                out,
-                "  lens      radial {:?}, tangential {:?}: warped when read",
-                lens.radial, lens.tangential
-            )?;
+            writeln!(out, "  lens      {}: warped when read", described(lens))?;
         }
     }
     let poses = frames.iter().filter(|frame| frame.truth.is_some()).count();

@@ -24,7 +24,6 @@ pub mod flo;
 pub mod flow_png;
 pub mod given;
 pub mod image;
-pub mod lens;
 pub mod motion_table;
 pub mod npy;
 pub mod npz;
@@ -36,6 +35,7 @@ pub mod source;
 pub mod stream;
 pub mod tracks;
 pub mod trajectory;
+pub mod undistort;
 pub mod write;
 
 pub use error::IoError;

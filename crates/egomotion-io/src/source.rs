@@ -10,7 +10,6 @@ mod listing;
 mod middlebury;
 mod moments;
 mod plain;
-mod stamped_poses;
 mod tartanair;
 mod true_disparity;
 mod tum_rgbd;
@@ -18,11 +17,10 @@ mod tum_rgbd;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use egomotion::geometry::{RigidMotion, StereoRectification, StereoRig};
+use egomotion::geometry::{Camera, RigidMotion, StereoRectification, StereoRig};
 use egomotion::pipeline::rgbd::DepthNoise;
 
 use crate::IoError;
-use crate::lens::Lens;
 pub use true_disparity::{DisparityEncoding, TrueDisparity};
 
 /// A recognised recording: one sequence, or a set of independent scenes.
@@ -81,7 +79,7 @@ pub struct DepthSensor {
     /// Scale of 16-bit depth images, in levels per metre.
     pub levels_per_m: f64,
     /// Distortion of both images, which are warped by it when fetched.
-    pub lens: Option<Lens>,
+    pub lens: Option<Camera>,
 }
 
 /// Consecutive stereo pairs of one rig.

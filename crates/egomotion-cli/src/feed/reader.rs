@@ -8,7 +8,7 @@ use egomotion::observe::{DisparityMap, FlowField, RectificationMap, Rectifier};
 use egomotion::pipeline::{DepthCamera, Frame, Unanswered};
 use egomotion_io::source::{DepthSensor, FrameFiles, Sequence};
 use egomotion_io::tracks::TrackTable;
-use egomotion_io::{IoError, depth, given, image, pfm};
+use egomotion_io::{IoError, depth, given, image, pfm, undistort};
 
 use super::{Fetched, Given};
 
@@ -85,7 +85,7 @@ impl Reader<'_> {
             let left = image::read(&files.left).map_err(bad)?;
             let depth_m = depth::read(file, sensor.levels_per_m).map_err(bad)?;
             let (left, depth_m) = match &sensor.lens {
-                Some(lens) => (lens.image(&camera.rig, &left), lens.depth(&camera.rig, &depth_m)),
+                Some(lens) => (undistort::image(lens, &left), undistort::depth(lens, &depth_m)),
                 None => (left, depth_m),
             };
             let frame = camera.frame(time_s, left, &depth_m);

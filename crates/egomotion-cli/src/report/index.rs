@@ -1,9 +1,9 @@
 //! `report.html` of a set: its scenes, each with a link to its own page.
 
-use maud::{DOCTYPE, PreEscaped, html};
+use maud::html;
 
-use super::page::{POLICY, STYLE};
-use crate::chart::PAGE_STYLE;
+use super::page::STYLE;
+use crate::chart::document::document;
 
 /// One scene of a set.
 #[derive(Debug, Clone)]
@@ -22,49 +22,37 @@ pub struct Scene {
 
 /// The index as one HTML document that loads nothing.
 pub fn render(source: &str, command: &str, complete: bool, scenes: &[Scene]) -> String {
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                title { (source) }
-                style { (PreEscaped(PAGE_STYLE)) (PreEscaped(STYLE)) }
-            }
-            body {
-                header {
-                    p class="kicker" { "egomotion · a set of scenes" }
-                    h1 { (source) }
-                    p class="lede" { "Each scene stands by itself, with a page of its own." }
-                    @if !complete { p class="about" { "The run was stopped before its end: only the scenes below were done." } }
-                }
-                main {
-                    section {
-                        div class="scroll" {
-                            table class="scenes" {
-                                thead { tr { th { "scene" } th { "frames" } th { "motion" } th { "against the set's true maps" } } }
-                                tbody {
-                                    @for scene in scenes {
-                                        tr {
-                                            td {
-                                                @if scene.has_page { a href=(format!("{}/report.html", scene.name)) { (scene.name) } }
-                                                @else { (scene.name) }
-                                            }
-                                            td { (scene.frames) }
-                                            td { (scene.outcome) }
-                                            td { (scene.verdict) }
-                                        }
+    let body = html! {
+        header {
+            p class="kicker" { "egomotion · a set of scenes" }
+            h1 { (source) }
+            p class="lede" { "Each scene stands by itself, with a page of its own." }
+            @if !complete { p class="about" { "The run was stopped before its end: only the scenes below were done." } }
+        }
+        main {
+            section {
+                div class="scroll" {
+                    table class="scenes" {
+                        thead { tr { th { "scene" } th { "frames" } th { "motion" } th { "against the set's true maps" } } }
+                        tbody {
+                            @for scene in scenes {
+                                tr {
+                                    td {
+                                        @if scene.has_page { a href=(format!("{}/report.html", scene.name)) { (scene.name) } }
+                                        @else { (scene.name) }
                                     }
+                                    td { (scene.frames) }
+                                    td { (scene.outcome) }
+                                    td { (scene.verdict) }
                                 }
                             }
                         }
                     }
-                    section { h2 { "Once more" } pre { code { (command) } } }
                 }
-                footer { "Made by egomotion " (env!("CARGO_PKG_VERSION")) "." }
             }
+            section { h2 { "Once more" } pre { code { (command) } } }
         }
+        footer { "Made by egomotion " (env!("CARGO_PKG_VERSION")) "." }
     };
-    page.into_string()
+    document(source, STYLE, &body)
 }

@@ -1,22 +1,19 @@
 //! The page: its sections in order, each with one plain sentence.
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 
 use super::series::{Series, Timeline};
 use super::trajectory::Path;
 use super::{
     Report, Stop, body, charts, data, impact, observed, phi, player, summary, tables, trouble, viewer,
 };
-use crate::chart::PAGE_STYLE;
+use crate::chart::document::scripted_document;
 use crate::chart::number::{fixed, significant};
 
 /// Rules for the parts of this page.
 pub const STYLE: &str = include_str!("page.css");
 /// Moves the slider and names values; without it the page shows its first pictures.
 const SCRIPT: &str = include_str!("page.js");
-/// Nothing is loaded from anywhere, whatever the texts of the input say.
-pub const POLICY: &str =
-    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
 /// Width and height of the chart of heights, in SVG units.
 const HEIGHT_SIZE: (f64, f64) = (400.0, 170.0);
@@ -34,46 +31,34 @@ pub fn render(report: &Report<'_>) -> String {
     let errors: Vec<Series> = phi.iter().filter_map(Series::errors).collect();
     let named: Vec<&Series> =
         body.iter().chain(&phi).chain(&errors).chain([&impact, &kept, &height]).collect();
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                title { (report.title) " – egomotion" }
-                style { (PreEscaped(PAGE_STYLE)) (PreEscaped(STYLE)) }
+    let body = html! {
+        header {
+            p class="kicker" { "egomotion · " (report.source) }
+            h1 { (report.title) }
+            (summary::lede(report))
+            (summary::figures(report, &path, &body))
+            (troubles(report))
+        }
+        main {
+            (player::bar(report, &stops))
+            (viewer::viewer(report, &stops))
+            div class="pair" {
+                (above(report, &path))
+                div { (heights(report, &timeline, &height)) (impacts(report, &timeline, &impact)) }
             }
-            body {
-                header {
-                    p class="kicker" { "egomotion · " (report.source) }
-                    h1 { (report.title) }
-                    (summary::lede(report))
-                    (summary::figures(report, &path, &body))
-                    (troubles(report))
-                }
-                main {
-                    (player::bar(report, &stops))
-                    (viewer::viewer(report, &stops))
-                    div class="pair" {
-                        (above(report, &path))
-                        div { (heights(report, &timeline, &height)) (impacts(report, &timeline, &impact)) }
-                    }
-                    (velocities(report, &timeline, &body))
-                    div class="pair" { (determined(report, &timeline, &kept)) (times(report)) }
-                    (scene_motion(report, &timeline, &phi))
-                    (numbers(report))
-                    (repeat(report))
-                }
-                footer { "Made by egomotion " (env!("CARGO_PKG_VERSION")) ". The numbers are in motion.csv and summary.json beside this page." }
-                @if needs_script(&stops) {
-                    script type="application/json" id="data" { (PreEscaped(data::json(&timeline, &named))) }
-                    script { (PreEscaped(SCRIPT)) }
-                }
-            }
+            (velocities(report, &timeline, &body))
+            div class="pair" { (determined(report, &timeline, &kept)) (times(report)) }
+            (scene_motion(report, &timeline, &phi))
+            (numbers(report))
+            (repeat(report))
+        }
+        footer { "Made by egomotion " (env!("CARGO_PKG_VERSION")) ". The numbers are in motion.csv and summary.json beside this page." }
+        @if needs_script(&stops) {
+            script type="application/json" id="data" { (PreEscaped(data::json(&timeline, &named))) }
+            script { (PreEscaped(SCRIPT)) }
         }
     };
-    page.into_string()
+    scripted_document(&format!("{} – egomotion", report.title), STYLE, &body)
 }
 
 fn needs_script(stops: &[Stop]) -> bool {

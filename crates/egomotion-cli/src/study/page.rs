@@ -1,20 +1,18 @@
 //! `page.html`: what studies show, as one self-contained page.
 
 use egomotion::study::{Figure, Publication, Table};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::figure::Drawing;
 use super::laboratory::Options;
 use super::table;
-use crate::chart::PAGE_STYLE;
+use crate::chart::document::document;
 use crate::chart::number::count;
 
 /// Its name in the folder of results.
 pub const NAME: &str = "page.html";
 /// Rules for the parts of this page.
 const STYLE: &str = include_str!("style.css");
-/// Nothing is loaded from anywhere, whatever the texts of a study say.
-const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'";
 
 /// One study of a page, with the names of its files.
 #[derive(Default)]
@@ -50,29 +48,17 @@ impl Chapter {
 pub fn render(chapters: &[Chapter], options: &Options) -> String {
     let only = chapters.first().map_or("", |chapter| chapter.publication.title.as_str());
     let title = options.title.as_deref().unwrap_or(only);
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                title { (title) }
-                style { (PreEscaped(PAGE_STYLE)) (PreEscaped(STYLE)) }
-            }
-            body {
-                header { h1 { (title) } }
-                main {
-                    (notes(chapters))
-                    (contents(chapters))
-                    @for chapter in chapters { (body(chapter, chapters.len() > 1)) }
-                    (repeat(chapters, options))
-                }
-                footer { "Made by egomotion " (env!("CARGO_PKG_VERSION")) ". Figures and tables are in files beside this page." }
-            }
+    let body = html! {
+        header { h1 { (title) } }
+        main {
+            (notes(chapters))
+            (contents(chapters))
+            @for chapter in chapters { (body(chapter, chapters.len() > 1)) }
+            (repeat(chapters, options))
         }
+        footer { "Made by egomotion " (env!("CARGO_PKG_VERSION")) ". Figures and tables are in files beside this page." }
     };
-    page.into_string()
+    document(title, STYLE, &body)
 }
 
 /// What is not done.

@@ -6,13 +6,17 @@ use std::path::{Path, PathBuf};
 
 use egomotion::geometry::{Distortion, RigidMotion, StereoRectification};
 
-use super::stamped_poses::StampedPoses;
+use super::moments::pose_at;
 use super::{Clock, FrameFiles, Layout, Recognised, Sequence, listing};
 use crate::calibration::{self, CameraPair, StereoCalibration, euroc, kalibr};
+use crate::trajectory::{self, Format};
 use crate::{IoError, read};
 
 /// Left and right images further apart in time than this do not belong together, in nanoseconds.
 const SAME_TIME_NS: i64 = 2_000_000;
+
+/// True poses further apart than this leave what lies between unknown, in seconds.
+const LONGEST_GAP_S: f64 = 0.1;
 
 /// Image files by time stamp in nanoseconds.
 type Images = BTreeMap<i64, PathBuf>;
@@ -146,12 +150,13 @@ fn add_truth(
     let body = bodies.into_iter().find(|file| file.is_file()).zip(body_from_left);
     let camera = top.join("groundtruth_cam0.txt");
     let (poses, carried_from_left) = match body {
-        Some((file, body_from_left)) => (StampedPoses::euroc(&file)?, body_from_left),
-        None if camera.is_file() => (StampedPoses::tum(&camera)?, RigidMotion::identity()),
+        Some((file, body_from_left)) => (trajectory::read(&file, Some(Format::Euroc))?, body_from_left),
+        None if camera.is_file() => (trajectory::read(&camera, Some(Format::Tum))?, RigidMotion::identity()),
         None => return Ok(()),
     };
-    for (stamp, frame) in frames {
-        let world_from_left = poses.at(*stamp).map(|pose| pose.after(&carried_from_left));
+    for (_, frame) in frames {
+        let pose = pose_at(&poses, frame.time_s, LONGEST_GAP_S);
+        let world_from_left = pose.map(|pose| pose.after(&carried_from_left));
         frame.truth = world_from_left.map(|pose| {
             rectification.map_or(pose, |rectification| rectification.world_from_rectified(&pose))
         });

@@ -8,13 +8,11 @@ use nalgebra::{Rotation3, UnitQuaternion};
 use crate::trajectory::Pose;
 use crate::{IoError, read};
 
-/// Poses further apart than this leave what lies between unknown, in seconds.
-const LONGEST_GAP_S: f64 = 0.2;
-
-/// The pose at a time: linear in position, spherical in rotation; `None` outside the poses or in a wide gap.
+/// The pose at a time: linear in position, spherical in rotation; `None` outside the poses or between two that are
+/// further apart than `longest_gap_s`.
 ///
 /// `poses` in order of time.
-pub(super) fn pose_at(poses: &[Pose], time_s: f64) -> Option<RigidMotion> {
+pub(super) fn pose_at(poses: &[Pose], time_s: f64, longest_gap_s: f64) -> Option<RigidMotion> {
     let time = |pose: &Pose| pose.time_s.unwrap_or(f64::NAN);
     let next = poses.partition_point(|pose| time(pose) < time_s);
     let after = poses.get(next)?;
@@ -28,7 +26,7 @@ pub(super) fn pose_at(poses: &[Pose], time_s: f64) -> Option<RigidMotion> {
     let quaternion =
         |m: &RigidMotion| UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m.rotation));
     let rotation = quaternion(a).try_slerp(&quaternion(b), share, 1e-12).unwrap_or_else(|| quaternion(a));
-    (gap <= LONGEST_GAP_S).then(|| RigidMotion {
+    (gap <= longest_gap_s).then(|| RigidMotion {
         rotation: rotation.to_rotation_matrix().into_inner(),
         translation: a.translation + share * (b.translation - a.translation),
     })
@@ -94,11 +92,12 @@ mod tests {
             },
         };
         let poses = [pose(1.0, 0.0, 0.0), pose(1.1, 0.4, 2.0), pose(3.0, 0.0, 0.0)];
-        let between = pose_at(&poses, 1.025).unwrap();
+        let between = pose_at(&poses, 1.025, 0.2).unwrap();
         assert!((between.translation.x - 0.5).abs() < 1e-9);
         assert!((between.log().omega.z - 0.1).abs() < 1e-9);
-        assert_eq!(pose_at(&poses, 1.1).unwrap(), poses[1].world_from_camera);
-        assert!([0.9, 2.0, 3.1].iter().all(|&t| pose_at(&poses, t).is_none()));
-        assert_eq!(pose_at(&[], 0.0), None);
+        assert_eq!(pose_at(&poses, 1.1, 0.2).unwrap(), poses[1].world_from_camera);
+        assert!([0.9, 2.0, 3.1].iter().all(|&t| pose_at(&poses, t, 0.2).is_none()));
+        assert_eq!(pose_at(&poses, 1.025, 0.05), None);
+        assert_eq!(pose_at(&[], 0.0, 0.2), None);
     }
 }

@@ -2,17 +2,18 @@
 
 use std::path::Path;
 
-use egomotion::geometry::StereoRig;
+use egomotion::geometry::{Camera, Distortion, StereoRig};
 use egomotion::pipeline::rgbd::{DepthNoise, VIRTUAL_BASELINE_M};
 
 use super::moments::{associate, pose_at, stamped_files};
 use super::{Clock, DepthSensor, FrameFiles, Layout, Recognised, Sequence, listing};
-use crate::lens::Lens;
 use crate::trajectory::{self, Format};
 use crate::{IoError, read};
 
 /// Longest time between an image and the depth that belongs to it, in seconds: that of the set's own tool.
 const SAME_MOMENT_S: f64 = 0.02;
+/// True poses further apart than this leave what lies between unknown, in seconds.
+const LONGEST_GAP_S: f64 = 0.2;
 /// Levels of the depth images per metre.
 const LEVELS_PER_M: f64 = 5000.0;
 
@@ -47,7 +48,7 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
         right: None,
         depth: depth.and_then(|k| depths.get(k)).map(|(_, path)| path.clone()),
         time_s,
-        truth: pose_at(&truth, time_s),
+        truth: pose_at(&truth, time_s, LONGEST_GAP_S),
     };
     let frames: Vec<FrameFiles> = images.into_iter().zip(belonging).enumerate().map(frame).collect();
     let size = listing::image_size(&frames)?;
@@ -66,7 +67,7 @@ fn camera(
     name: &str,
     calibration: Option<&Path>,
     size: (usize, usize),
-) -> Result<(StereoRig, Option<Lens>), IoError> {
+) -> Result<(StereoRig, Option<Camera>), IoError> {
     let own = folder.join("calibration.txt");
     let file = calibration.or_else(|| own.is_file().then_some(&own));
     let [fx, fy, cx, cy, k1, k2, p1, p2, k3] = match file {
@@ -82,14 +83,17 @@ fn camera(
                 )
             })?,
     };
+    let refuse =
+        |reason: String| IoError::new(file.unwrap_or(folder), reason, format_args!("give {NUMBERS}"));
     let rig = StereoRig::new(fx, (cx, cy), VIRTUAL_BASELINE_M, size);
     let rig = rig.map(|rig| StereoRig { focal_y_px: fy, ..rig });
-    let rig = rig
-        .and_then(|rig| rig.check().map(|()| rig))
-        .map_err(|error| IoError::new(file.unwrap_or(folder), error, format_args!("give {NUMBERS}")))?;
-    let lens = Lens { radial: [k1, k2, k3], tangential: [p1, p2] };
-    let bends = [k1, k2, p1, p2, k3].iter().any(|k| *k != 0.0);
-    Ok((rig, bends.then_some(lens)))
+    let rig = rig.and_then(|rig| rig.check().map(|()| rig)).map_err(|error| refuse(error.to_string()))?;
+    if [k1, k2, p1, p2, k3].iter().all(|k| *k == 0.0) {
+        return Ok((rig, None));
+    }
+    let lens = Distortion::RadialTangential { k: [k1, k2, k3], p: [p1, p2] };
+    let lens = Camera::new((fx, fy), (cx, cy), lens, size).map_err(|error| refuse(error.to_string()))?;
+    Ok((rig, Some(lens)))
 }
 
 /// What a calibration file holds.

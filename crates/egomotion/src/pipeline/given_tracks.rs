@@ -5,12 +5,11 @@ use std::collections::HashMap;
 use nalgebra::{Matrix3, Vector3};
 
 use super::config::{Config, ConfigError, Method, Observe};
-use super::stereo::{FrameMotion, PipelineError, StageTimes};
+use super::stereo::{FrameMotion, MOST_FAILURES, PipelineError, StageTimes};
 use super::track_solver::TrackSolver;
 use super::unanswered::Unanswered;
 use crate::estimate::median;
 use crate::geometry::{Gaussian, StereoRig, Twist};
-use crate::motion::obstacle::NoObstacle;
 use crate::observe::StereoTrack;
 
 /// A point of a track: where one frame's two images show it, in pixels.
@@ -28,8 +27,6 @@ pub struct TrackPoint {
 const PLACE_SIGMA_PX: f64 = 0.5;
 /// Of fewer tracks the distribution of their residuals cannot be told: then Student's t is taken as it stands.
 const FEWEST_FITTED: usize = 200;
-/// Frames since the reference without an answer, after which it is given up.
-const MOST_FAILURES: usize = 2;
 
 /// Turns tracks into motion: the estimation of [`super::StereoMotion`] without its images.
 ///
@@ -77,20 +74,10 @@ impl TrackMotion {
 
     /// Account for a frame that could not be read.
     pub fn skip(&mut self, time_s: f64, why: Unanswered) -> FrameMotion {
+        let frame = self.frames;
         self.frames += 1;
-        let reference = self.reference.as_ref();
-        FrameMotion {
-            frame: self.frames - 1,
-            reference: reference.map(|r| r.frame),
-            time_s,
-            dt_s: reference.map(|r| time_s - r.time_s),
-            motion: Err(why),
-            row_disagreement_px: None,
-            obstacle: Err(NoObstacle::NothingMeasured),
-            moving: Vec::new(),
-            dense: None,
-            stages: StageTimes::default(),
-        }
+        let reference = self.reference.as_ref().map(|r| (r.frame, r.time_s));
+        FrameMotion::unanswered((frame, time_s), reference, why)
     }
 
     /// The motion from the last good frame to this one, from the tracks that both have.
@@ -113,14 +100,14 @@ impl TrackMotion {
         let fresh = points.keys().filter(|track| before.points.contains_key(track)).count();
         if shared > 0 && fresh == 0 {
             // New tracks tell of a time that the old ones do not reach: the motion up to it is lost.
-            let mut answer =
-                FrameMotion { reference: Some(before.frame), ..self.skip(time_s, Unanswered::RepeatedFrame) };
-            answer.dt_s = Some(time_s - before.time_s);
+            let frame = self.frames;
+            self.frames += 1;
+            let reference = Some((before.frame, before.time_s));
             self.reference = Some(match points.is_empty() {
                 true => before,
-                false => Reference { frame: answer.frame, time_s, points },
+                false => Reference { frame, time_s, points },
             });
-            return answer;
+            return FrameMotion::unanswered((frame, time_s), reference, Unanswered::RepeatedFrame);
         }
         self.compare(before, Reference { frame: self.frames, time_s, points })
     }

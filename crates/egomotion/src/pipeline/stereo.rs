@@ -69,6 +69,26 @@ pub struct FrameMotion {
 }
 
 impl FrameMotion {
+    /// No answer for a frame at a time, beside the reference frame and its time.
+    pub(super) fn unanswered(
+        (frame, time_s): (usize, f64),
+        reference: Option<(usize, f64)>,
+        why: Unanswered,
+    ) -> Self {
+        Self {
+            frame,
+            reference: reference.map(|(frame, _)| frame),
+            time_s,
+            dt_s: reference.map(|(_, before_s)| time_s - before_s),
+            motion: Err(why),
+            row_disagreement_px: None,
+            obstacle: Err(NoObstacle::NothingMeasured),
+            moving: Vec::new(),
+            dense: None,
+            stages: StageTimes::default(),
+        }
+    }
+
     /// Time to impact of the nearest obstacle.
     pub fn impact(&self) -> Option<TimeToImpact> {
         self.obstacle.as_ref().ok().map(|obstacle| obstacle.impact)
@@ -108,7 +128,7 @@ pub struct StereoMotion {
 }
 
 /// After this many good frames without an answer the reference itself is given up.
-const MOST_FAILURES: usize = 2;
+pub(super) const MOST_FAILURES: usize = 2;
 
 impl StereoMotion {
     /// A pipeline for one rig.
@@ -152,18 +172,8 @@ impl StereoMotion {
     pub fn skip(&mut self, time_s: f64, why: Unanswered) -> FrameMotion {
         let frame = self.frames;
         self.frames += 1;
-        FrameMotion {
-            frame,
-            reference: self.reference.as_ref().map(|r| r.frame),
-            time_s,
-            dt_s: self.reference.as_ref().map(|r| time_s - r.time_s),
-            motion: Err(why),
-            row_disagreement_px: None,
-            obstacle: Err(NoObstacle::NothingMeasured),
-            moving: Vec::new(),
-            dense: None,
-            stages: StageTimes::default(),
-        }
+        let reference = self.reference.as_ref().map(|r| (r.frame, r.time_s));
+        FrameMotion::unanswered((frame, time_s), reference, why)
     }
 
     /// The motion from the last good frame to this one.
