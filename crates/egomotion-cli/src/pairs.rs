@@ -94,7 +94,7 @@ pub fn run(
             // One pair that cannot be read does not end the others.
             Err(error) if !single => {
                 terminal::tell(format_args!("{}: {error:#}", pair.name));
-                continue_with(args, config, pair, &error)
+                failed(args, config, pair, &error)
             }
             Err(error) => return Err(error),
         };
@@ -171,7 +171,7 @@ fn empty(args: &RunArgs, config: &Config, pair: &Sequence) -> PairSummary {
 }
 
 /// What stands in the index for a pair that failed.
-fn continue_with(args: &RunArgs, config: &Config, pair: &Sequence, error: &anyhow::Error) -> PairSummary {
+fn failed(args: &RunArgs, config: &Config, pair: &Sequence, error: &anyhow::Error) -> PairSummary {
     let error = Some(format!("{error:#}"));
     PairSummary { status: "bad_image", counts: [("bad_image", 1)].into(), error, ..empty(args, config, pair) }
 }

@@ -1,11 +1,11 @@
 //! `--maps`: one file a frame pair in each folder, on the earlier frame's pixel grid.
 
 use egomotion::geometry::Field;
-use egomotion_io::{flo, pfm};
+use egomotion_io::{flo, flow_png, image, npy, pfm};
 use tempfile::TempDir;
 
 use crate::outputs::dense_results;
-use crate::process::{names, run};
+use crate::process::{names, run, try_run};
 use crate::recording::{FRAMES, SIZE, drive, recording};
 
 const PFM: [&str; 7] = [
@@ -79,4 +79,34 @@ fn maps_are_named_by_the_earlier_frame_s_index() {
     let out = TempDir::new().unwrap();
     run(recording(), out.path(), "--maps --frames 3 --reverse");
     assert_eq!(names(&out.path().join("flow")), ["000001.flo", "000002.flo"]);
+}
+
+#[test]
+fn maps_in_every_format_and_clouds() {
+    let out = TempDir::new().unwrap();
+    run(recording(), out.path(), "--frames 2 --maps-as pfm,npy,kitti,colour --cloud vz");
+    for folder in PFM {
+        let at = |ending: &str| out.path().join(folder).join(format!("000000.{ending}"));
+        let (pfm, npy) = (pfm::read(&at("pfm")).unwrap(), npy::read_map(&at("npy")).unwrap());
+        let mut pixels = (0..240).flat_map(|v| (0..320).map(move |u| (u, v)));
+        assert!(pixels.all(|(u, v)| pfm.get(u, v) == npy.get(u, v)) && pfm.count() > 1000, "{folder}");
+        assert!(image::read(&at("colour.png")).unwrap().size() == SIZE, "{folder}");
+        assert_eq!(at("png").is_file(), folder == "disparity", "{folder}");
+    }
+    let at = |ending: &str| out.path().join("flow").join(format!("000000.{ending}"));
+    let [u, _] = npy::read_flow(&at("npy")).unwrap();
+    let kitti = flow_png::read(&at("png")).unwrap();
+    let both = (0..240)
+        .flat_map(|v| (0..320).map(move |u| (u, v)))
+        .filter_map(|(x, y)| u.get(x, y).zip(kitti[0].get(x, y)));
+    assert!(
+        both.clone().count() > 1000 && both.into_iter().all(|(a, b)| (a - b).abs() <= 1.0 / 128.0 + 1e-4)
+    );
+    let cloud = std::fs::read(out.path().join("cloud/000000.ply")).unwrap();
+    let head = String::from_utf8_lossy(&cloud[..400]).into_owned();
+    assert!(head.contains("property float depth_velocity_sigma"), "{head}");
+    let points: usize =
+        head.lines().find_map(|l| l.strip_prefix("element vertex ")).unwrap().parse().unwrap();
+    assert!(points > 70_000, "{points}");
+    assert_eq!(try_run(recording(), out.path(), "--observe sparse --cloud vz").code, 2);
 }
