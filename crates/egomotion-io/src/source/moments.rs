@@ -8,15 +8,18 @@ use nalgebra::{Rotation3, UnitQuaternion};
 use crate::trajectory::Pose;
 use crate::{IoError, read};
 
+/// Times no further apart are one: a time stamp of today in seconds is rounded to 2.4e-7 s.
+const SAME_TIME_S: f64 = 1e-6;
+
 /// The pose at a time: linear in position, spherical in rotation; `None` outside the poses or between two that are
 /// further apart than `longest_gap_s`.
 ///
 /// `poses` in order of time.
 pub(super) fn pose_at(poses: &[Pose], time_s: f64, longest_gap_s: f64) -> Option<RigidMotion> {
     let time = |pose: &Pose| pose.time_s.unwrap_or(f64::NAN);
-    let next = poses.partition_point(|pose| time(pose) < time_s);
+    let next = poses.partition_point(|pose| time(pose) < time_s - SAME_TIME_S);
     let after = poses.get(next)?;
-    if time(after) == time_s {
+    if time(after) <= time_s + SAME_TIME_S {
         return Some(after.world_from_camera);
     }
     let before = poses.get(next.checked_sub(1)?)?;
@@ -95,7 +98,10 @@ mod tests {
         let between = pose_at(&poses, 1.025, 0.2).unwrap();
         assert!((between.translation.x - 0.5).abs() < 1e-9);
         assert!((between.log().omega.z - 0.1).abs() < 1e-9);
-        assert_eq!(pose_at(&poses, 1.1, 0.2).unwrap(), poses[1].world_from_camera);
+        for rounded in [1.1, 1.1 - 2e-7, 1.1 + 2e-7] {
+            assert_eq!(pose_at(&poses, rounded, 0.05).unwrap(), poses[1].world_from_camera);
+        }
+        assert!(pose_at(&poses, 3.0 + 2e-7, 0.05).is_some());
         assert!([0.9, 2.0, 3.1].iter().all(|&t| pose_at(&poses, t, 0.2).is_none()));
         assert_eq!(pose_at(&poses, 1.025, 0.05), None);
         assert_eq!(pose_at(&[], 0.0, 0.2), None);
