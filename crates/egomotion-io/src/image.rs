@@ -11,7 +11,7 @@ use crate::raster::{self, Raster};
 use crate::{IoError, read};
 
 /// Rec. 601 luma of red, green and blue.
-const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
+pub const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
 /// Endings of the names of images that can be read, in small letters.
 pub const ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "tif", "tiff", "pgm", "ppm", "pnm"];

@@ -1,0 +1,77 @@
+//! Estimators on what was measured: maximum likelihood with its bound, and errors in variables.
+
+use egomotion::estimate::errors_in_variables as variables;
+use egomotion::estimate::m_estimator::StudentT;
+use egomotion::estimate::maximum_likelihood as likelihood;
+use egomotion::estimate::{Blocks, Unsolvable};
+use egomotion::geometry::Twist;
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::arrays;
+use crate::error::unsolvable;
+use crate::estimate::Estimate;
+use crate::estimators::kernel;
+use crate::geometry::twist;
+use crate::observations::{DepthChanges, StereoTracks};
+use crate::rig::Rig;
+
+/// φ of maximum likelihood in (x, y, d) at both times, with the cost Σ eᵀ S⁻¹ e as second value.
+///
+/// `nu` infinite is the Gaussian; by default robust weights are found from the residuals. With `block_px` the covariance
+/// is block-wise, without it the model's.
+#[pyfunction]
+#[pyo3(signature = (tracks, rig, *, start = None, nu = None, block_px = None, iterations = None, tolerance = None))]
+#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+pub fn maximum_likelihood(
+    py: Python<'_>,
+    tracks: &StereoTracks,
+    rig: &Rig,
+    start: Option<&Bound<'_, PyAny>>,
+    nu: Option<f64>,
+    block_px: Option<f64>,
+    iterations: Option<usize>,
+    tolerance: Option<f64>,
+) -> PyResult<(Estimate, f64)> {
+    let default = kernel(nu)?;
+    let kernel = StudentT {
+        iterations: iterations.unwrap_or(default.iterations),
+        tolerance: tolerance.unwrap_or(default.tolerance),
+        ..default
+    };
+    let start = start.map_or_else(|| Ok(Twist::zero()), |start| twist("start", start))?;
+    let blocks = block_px.map(|size| Blocks::over(&rig.0, size));
+    let found =
+        py.detach(|| likelihood::maximum_likelihood(&tracks.0, &rig.0, &start, blocks.as_ref(), &kernel));
+    let found = found.map_err(unsolvable)?;
+    Ok((Estimate::of(&found.motion), found.cost))
+}
+
+/// The Cramér–Rao bound (6, 6) of φ from tracks, at the motion φ (6,) and the tracks' own structure.
+#[pyfunction]
+pub fn cramer_rao_bound<'py>(
+    py: Python<'py>,
+    tracks: &StereoTracks,
+    rig: &Rig,
+    phi: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let phi = twist("phi", phi)?;
+    let bound = likelihood::cramer_rao_bound(&tracks.0, &rig.0, &phi);
+    arrays::square(py, &bound.ok_or_else(|| unsolvable(Unsolvable::Unobservable))?)
+}
+
+/// φ from depth changes with noisy gradients: DCCE without its bias, from `start` (6,).
+#[pyfunction]
+#[pyo3(signature = (changes, rig, *, start = None, block_px = 48.0))]
+pub fn errors_in_variables(
+    py: Python<'_>,
+    changes: &DepthChanges,
+    rig: &Rig,
+    start: Option<&Bound<'_, PyAny>>,
+    block_px: f64,
+) -> PyResult<Estimate> {
+    let start = start.map_or_else(|| Ok(Twist::zero()), |start| twist("start", start))?;
+    let blocks = Blocks::over(&rig.0, block_px);
+    let found = py.detach(|| variables::errors_in_variables(&changes.0, &rig.0, &start, &blocks));
+    Ok(Estimate::of(&found.map_err(unsolvable)?))
+}

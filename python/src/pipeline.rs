@@ -1,0 +1,136 @@
+//! Frames in, motion out.
+
+use egomotion::pipeline::rgbd::VIRTUAL_BASELINE_M;
+use egomotion::pipeline::{
+    DepthCamera, DepthNoise, Frame, RgbdMotion as Rgbd, StereoFrame, StereoMotion as Stereo,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays;
+use crate::config::{Threads, config};
+use crate::error;
+use crate::frame_motion::FrameMotion;
+use crate::observe::given;
+use crate::rig::Rig;
+
+/// Turns a sequence of rectified stereo images into motion.
+#[pyclass(module = "egomotion")]
+pub struct StereoMotion {
+    motion: Stereo,
+    threads: Threads,
+}
+
+#[pymethods]
+impl StereoMotion {
+    /// A pipeline for one rig, on so many threads of its own or on those of the process.
+    ///
+    /// `mask` (H, W) bool marks pixels never to use; other keywords are the settings of `default_config()`.
+    #[new]
+    #[pyo3(signature = (rig, *, threads = None, mask = None, **settings))]
+    fn new(
+        py: Python<'_>,
+        rig: &Rig,
+        threads: Option<usize>,
+        mask: Option<&Bound<'_, PyAny>>,
+        settings: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let mut motion = Stereo::new(rig.0, config(py, settings)?).map_err(error::value)?;
+        if let Some(mask) = mask {
+            let mask = arrays::mask("mask", mask)?;
+            let wanted = (rig.0.width_px, rig.0.height_px);
+            if mask.size() != wanted {
+                let words = format!("mask is {:?} pixels wide and high, the rig {wanted:?}", mask.size());
+                return Err(PyValueError::new_err(words));
+            }
+            motion.set_mask(Some(mask));
+        }
+        Ok(Self { motion, threads: Threads::new(threads)? })
+    }
+
+    /// The motion from the last good frame to this one, at `time` in seconds.
+    ///
+    /// Images are (H, W), or (H, W, 3) as red, green, blue; uint8, uint16 or float32. With `disparity` (H, W), and perhaps
+    /// its `disparity_sigma`, of the left image's pixels that map is used in place of our own, and the right image may
+    /// be None. An image that cannot be used is no exception: the answer's status says why.
+    #[pyo3(signature = (left, right, time, *, disparity = None, disparity_sigma = None))]
+    fn push(
+        &mut self,
+        py: Python<'_>,
+        left: &Bound<'_, PyAny>,
+        right: Option<&Bound<'_, PyAny>>,
+        time: f64,
+        disparity: Option<&Bound<'_, PyAny>>,
+        disparity_sigma: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<FrameMotion> {
+        let left = arrays::image("left", left)?;
+        let right = right.map(|right| arrays::image("right", right)).transpose()?;
+        let disparity = given(disparity, disparity_sigma)?;
+        let frame = match (right, disparity) {
+            (Some(right), None) => StereoFrame { time_s: time, left, right }.into(),
+            (None, None) => return Err(PyValueError::new_err("give the right image, or a disparity map")),
+            (right, disparity) => Frame { time_s: time, left, right, disparity, flow: None },
+        };
+        let motion = &mut self.motion;
+        Ok(FrameMotion::of(self.threads.run(py, || motion.push(frame))))
+    }
+}
+
+/// Turns a sequence of depth images with intensity into motion.
+#[pyclass(module = "egomotion")]
+pub struct RgbdMotion {
+    motion: Rgbd,
+    threads: Threads,
+}
+
+#[pymethods]
+impl RgbdMotion {
+    /// A pipeline for a depth camera of focal length (px), principal point (px) and image size (width, height).
+    ///
+    /// `noise` is "kinect" (structured light), "time-of-flight" or "exact"; other keywords are the settings of
+    /// `default_config()`.
+    #[new]
+    #[pyo3(signature = (focal, centre, size, *, focal_y = None, noise = "kinect", threads = None, **settings))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn new(
+        py: Python<'_>,
+        focal: f64,
+        centre: (f64, f64),
+        size: (usize, usize),
+        focal_y: Option<f64>,
+        noise: &str,
+        threads: Option<usize>,
+        settings: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let mut rig = egomotion::geometry::StereoRig::new(focal, centre, VIRTUAL_BASELINE_M, size)
+            .map_err(error::value)?;
+        rig.focal_y_px = focal_y.unwrap_or(focal);
+        let noise = match noise {
+            "kinect" => DepthNoise::kinect(),
+            "time-of-flight" => DepthNoise::time_of_flight(),
+            "exact" => DepthNoise::exact(),
+            other => {
+                let words =
+                    format!("noise {other:?} is not known; give 'kinect', 'time-of-flight' or 'exact'");
+                return Err(PyValueError::new_err(words));
+            }
+        };
+        let motion = Rgbd::new(DepthCamera { rig, noise }, config(py, settings)?).map_err(error::value)?;
+        Ok(Self { motion, threads: Threads::new(threads)? })
+    }
+
+    /// The motion from the last good frame to this one; `depth` (H, W) in metres on the image's pixels, NaN or 0 where
+    /// it is unknown.
+    fn push(
+        &mut self,
+        py: Python<'_>,
+        image: &Bound<'_, PyAny>,
+        depth: &Bound<'_, PyAny>,
+        time: f64,
+    ) -> PyResult<FrameMotion> {
+        let (image, depth) = (arrays::image("image", image)?, arrays::field("depth", depth)?);
+        let motion = &mut self.motion;
+        Ok(FrameMotion::of(self.threads.run(py, || motion.push(time, image, &depth))))
+    }
+}

@@ -1,0 +1,148 @@
+//! A rectified pair of cameras.
+
+use egomotion::geometry::StereoRig;
+use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arrays;
+
+/// A rectified stereo rig: pinhole cameras with parallel axes.
+///
+/// Lengths are metres, image coordinates pixels. x and y count from the principal point, x right, y down, and are
+/// scaled to the horizontal focal length; d = x_left − x_right = baseline · focal / Z.
+#[pyclass(name = "StereoRig", module = "egomotion", frozen, from_py_object)]
+#[derive(Clone, Copy)]
+pub struct Rig(pub StereoRig);
+
+#[pymethods]
+impl Rig {
+    /// A rig of focal length (px), principal point (px), baseline (m) and image size (width, height).
+    ///
+    /// `doffs` is cx_right − cx_left; `focal_y` the vertical focal length where pixels are not square.
+    #[new]
+    #[pyo3(signature = (focal, centre, baseline, size, *, doffs = 0.0, focal_y = None))]
+    fn new(
+        focal: f64,
+        centre: (f64, f64),
+        baseline: f64,
+        size: (usize, usize),
+        doffs: f64,
+        focal_y: Option<f64>,
+    ) -> PyResult<Self> {
+        let rig = StereoRig {
+            focal_px: focal,
+            focal_y_px: focal_y.unwrap_or(focal),
+            cx_px: centre.0,
+            cy_px: centre.1,
+            doffs_px: doffs,
+            baseline_m: baseline,
+            width_px: size.0,
+            height_px: size.1,
+        };
+        rig.check().map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(Self(rig))
+    }
+
+    /// Horizontal focal length in pixels.
+    #[getter]
+    fn focal(&self) -> f64 {
+        self.0.focal_px
+    }
+
+    /// Vertical focal length in pixels.
+    #[getter]
+    fn focal_y(&self) -> f64 {
+        self.0.focal_y_px
+    }
+
+    /// Principal point of the left camera (u, v) in pixels.
+    #[getter]
+    fn centre(&self) -> (f64, f64) {
+        (self.0.cx_px, self.0.cy_px)
+    }
+
+    /// Distance between the optical centres in metres.
+    #[getter]
+    fn baseline(&self) -> f64 {
+        self.0.baseline_m
+    }
+
+    /// Difference of the principal points, cx_right − cx_left, in pixels.
+    #[getter]
+    fn doffs(&self) -> f64 {
+        self.0.doffs_px
+    }
+
+    /// Image size (width, height) in pixels.
+    #[getter]
+    fn size(&self) -> (usize, usize) {
+        (self.0.width_px, self.0.height_px)
+    }
+
+    /// Depth Z (n,) in metres of disparities d (n,) in pixels; NaN where d is not positive.
+    fn depth<'py>(&self, py: Python<'py>, d: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let d = arrays::vector("d", d)?;
+        Ok(PyArray1::from_iter(py, d.into_iter().map(|d| self.0.depth(d).unwrap_or(f64::NAN))))
+    }
+
+    /// Disparity d (n,) in pixels of depths (n,) in metres; NaN where Z is not positive.
+    fn disparity<'py>(&self, py: Python<'py>, z: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let z = arrays::vector("z", z)?;
+        Ok(PyArray1::from_iter(py, z.into_iter().map(|z| self.0.disparity(z).unwrap_or(f64::NAN))))
+    }
+
+    /// Points P (n, 3) in metres, left camera, of (x, y, d) (n, 3) in pixels; NaN where d is not positive.
+    fn point<'py>(&self, py: Python<'py>, xyd: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let xyd = arrays::rows::<3>("xyd", xyd)?;
+        arrays::table(py, xyd.iter().map(|xyd| self.0.point(xyd).unwrap_or(UNKNOWN)))
+    }
+
+    /// (x, y, d) (n, 3) in pixels of points P (n, 3) in metres; NaN where Z is not positive.
+    fn project<'py>(&self, py: Python<'py>, p: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let p = arrays::rows::<3>("p", p)?;
+        arrays::table(py, p.iter().map(|p| self.0.project(p).unwrap_or(UNKNOWN)))
+    }
+
+    /// (x, y) (n, 2) of pixels (u, v) (n, 2).
+    fn image_from_pixel<'py>(
+        &self,
+        py: Python<'py>,
+        uv: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let uv = arrays::rows::<2>("uv", uv)?;
+        arrays::table(py, uv.iter().map(|uv| <[f64; 2]>::from(self.0.image_from_pixel(uv.x, uv.y)).into()))
+    }
+
+    /// Pixels (u, v) (n, 2) of (x, y) (n, 2).
+    fn pixel_from_image<'py>(
+        &self,
+        py: Python<'py>,
+        xy: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let xy = arrays::rows::<2>("xy", xy)?;
+        arrays::table(py, xy.iter().map(|xy| <[f64; 2]>::from(self.0.pixel_from_image(xy.x, xy.y)).into()))
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.0 == other.0
+    }
+
+    fn __repr__(&self) -> String {
+        let rig = &self.0;
+        format!(
+            "StereoRig(focal={:?}, centre=({:?}, {:?}), baseline={:?}, size=({}, {}), doffs={:?}, focal_y={:?})",
+            rig.focal_px,
+            rig.cx_px,
+            rig.cy_px,
+            rig.baseline_m,
+            rig.width_px,
+            rig.height_px,
+            rig.doffs_px,
+            rig.focal_y_px
+        )
+    }
+}
+
+/// Where there is no point.
+const UNKNOWN: nalgebra::Vector3<f64> = nalgebra::Vector3::new(f64::NAN, f64::NAN, f64::NAN);
