@@ -7,6 +7,9 @@ use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, P
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+/// Two arrays (H, W).
+pub type Two<'py, T> = (Bound<'py, PyArray2<T>>, Bound<'py, PyArray2<T>>);
+
 /// What NumPy makes of an argument, in C order and aligned: without a copy where it is so already.
 fn contiguous<'py>(argument: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let numpy = argument.py().import("numpy")?;

@@ -5,18 +5,27 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::ThreadPool;
+use serde::de::DeserializeOwned;
 
 use crate::error;
 
-/// The settings named by keywords, the others as they are by default; nested ones are dictionaries.
-pub fn config(py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Config> {
-    let Some(keywords) = keywords else { return Ok(Config::default()) };
+/// Settings by keywords, the others as they are by default; nested ones are dictionaries.
+pub fn from_keywords<T: DeserializeOwned + Default>(
+    py: Python<'_>,
+    keywords: Option<&Bound<'_, PyDict>>,
+) -> PyResult<T> {
+    let Some(keywords) = keywords else { return Ok(T::default()) };
     let text: String = py.import("json")?.call_method1("dumps", (keywords,))?.extract()?;
-    let config: Config = serde_json::from_str(&text).map_err(|error| {
+    serde_json::from_str(&text).map_err(|error| {
         // Lines and columns of the text in between mean nothing to the caller.
         let words = error.to_string();
         PyValueError::new_err(words.split(" at line ").next().unwrap_or(&words).to_owned())
-    })?;
+    })
+}
+
+/// The settings of a pipeline, checked.
+pub fn config(py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Config> {
+    let config: Config = from_keywords(py, keywords)?;
     config.check().map_err(error::value)?;
     Ok(config)
 }

@@ -12,7 +12,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays;
 use crate::estimate::Estimate;
-use crate::geometry::Motion;
+use crate::geometry::{Motion, pose};
 
 /// A rectangle of pixels: u, v, width, height.
 type Rectangle = (usize, usize, usize, usize);
@@ -161,11 +161,6 @@ impl FrameMotion {
         let grid: Option<Grid<f32>> = self.answer.dense.as_ref().map(|dense| dense.motion.seconds(&quantity));
         grid.map(|grid| arrays::plane(py, &grid)).transpose()
     }
-}
-
-/// A rotation (3, 3) and a translation (3,).
-fn pose<'py>(py: Python<'py>, motion: &RigidMotion) -> PyResult<Motion<'py>> {
-    Ok((arrays::square(py, &motion.rotation)?, PyArray1::from_slice(py, motion.translation.as_slice())))
 }
 
 #[pymethods]

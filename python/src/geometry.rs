@@ -19,6 +19,11 @@ pub fn phi<'py>(py: Python<'py>, twist: &Twist) -> Bound<'py, PyArray1<f64>> {
     PyArray1::from_slice(py, twist.vector().as_slice())
 }
 
+/// R (3, 3) and T (3,) as arrays.
+pub fn pose<'py>(py: Python<'py>, motion: &RigidMotion) -> PyResult<Motion<'py>> {
+    Ok((arrays::square(py, &motion.rotation)?, PyArray1::from_slice(py, motion.translation.as_slice())))
+}
+
 /// R and T of a motion; R must be a rotation.
 pub fn motion(rotation: &Bound<'_, PyAny>, translation: &Bound<'_, PyAny>) -> PyResult<RigidMotion> {
     let motion = any_motion(rotation, translation)?;
@@ -43,8 +48,7 @@ fn any_motion(rotation: &Bound<'_, PyAny>, translation: &Bound<'_, PyAny>) -> Py
 #[pyfunction]
 #[pyo3(signature = (phi, dt = 1.0))]
 pub fn exp<'py>(py: Python<'py>, phi: &Bound<'py, PyAny>, dt: f64) -> PyResult<Motion<'py>> {
-    let motion = twist("phi", phi)?.scaled(dt).exp();
-    Ok((arrays::square(py, &motion.rotation)?, PyArray1::from_slice(py, motion.translation.as_slice())))
+    pose(py, &twist("phi", phi)?.scaled(dt).exp())
 }
 
 /// φ (6,) of a rotation (3, 3) and a translation (3,), with exp(φ) = (R, T).
@@ -74,7 +78,7 @@ pub fn rotation_and_u<'py>(
     py: Python<'py>,
     phi: &Bound<'py, PyAny>,
     dt: f64,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+) -> PyResult<arrays::Two<'py, f64>> {
     let (r, u) = twist("phi", phi)?.rotation_and_u(dt);
     Ok((arrays::square(py, &r)?, arrays::square(py, &u)?))
 }

@@ -7,6 +7,7 @@ mod config;
 mod error;
 mod estimate;
 mod estimators;
+mod evaluate;
 mod frame_motion;
 mod geometry;
 mod measured;
@@ -15,6 +16,8 @@ mod observe;
 mod pipeline;
 mod rig;
 mod rows;
+mod study;
+mod world;
 
 use pyo3::prelude::*;
 
@@ -31,6 +34,8 @@ mod _native {
     use crate::estimate::Estimate;
     #[pymodule_export]
     use crate::estimators::{irls, least_squares, lmeds, lmeds_search, lmeds_trials, robust_scale, two_step};
+    #[pymodule_export]
+    use crate::evaluate::evaluate;
     #[pymodule_export]
     use crate::frame_motion::{FrameMotion, Impact, MovingGroup};
     #[pymodule_export]
@@ -49,4 +54,8 @@ mod _native {
     use crate::rig::Rig;
     #[pymodule_export]
     use crate::rows::Rows;
+    #[pymodule_export]
+    use crate::study::Study;
+    #[pymodule_export]
+    use crate::world::Sequence;
 }

@@ -4,7 +4,7 @@ use egomotion::geometry::Twist;
 use egomotion::observe::tracks::{Hints, stereo_tracks};
 use egomotion::observe::{DisparityMap, DisparityMatcher, Pyramid, StereoPyramid, dense_flow};
 use egomotion::pipeline::Config;
-use numpy::{PyArray2, PyArray3};
+use numpy::PyArray3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -56,12 +56,15 @@ pub fn disparity<'py>(
     left: &Bound<'py, PyAny>,
     right: &Bound<'py, PyAny>,
     settings: Option<&Bound<'py, PyDict>>,
-) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
+) -> PyResult<arrays::Two<'py, f32>> {
     let (left, right) = (arrays::image("left", left)?, arrays::image("right", right)?);
     let options = part(py, "disparity", settings)?.disparity;
     let map = py.detach(|| DisparityMatcher::new(options).compute(&left, &right)).map_err(error::value)?;
     Ok((arrays::field_plane(py, &map.shift)?, arrays::field_plane(py, &map.sigma)?))
 }
+
+/// Flow (H, W, 2) and its covariance (H, W, 3).
+type FlowAndCovariance<'py> = (Bound<'py, PyArray3<f32>>, Bound<'py, PyArray3<f32>>);
 
 /// Flow (H, W, 2) from one image to another in pixels, on the first one's pixels, and its covariance (H, W, 3) as uu, uv,
 /// vv; NaN where nothing can be measured. Keywords are the settings `flow` of `default_config()`.
@@ -72,7 +75,7 @@ pub fn flow<'py>(
     before: &Bound<'py, PyAny>,
     after: &Bound<'py, PyAny>,
     settings: Option<&Bound<'py, PyDict>>,
-) -> PyResult<(Bound<'py, PyArray3<f32>>, Bound<'py, PyArray3<f32>>)> {
+) -> PyResult<FlowAndCovariance<'py>> {
     let (before, after) = (arrays::image("before", before)?, arrays::image("after", after)?);
     let config = part(py, "flow", settings)?;
     let levels = config.tracks.pyramid_levels;

@@ -20,6 +20,7 @@ pub mod calibration;
 pub mod depth;
 pub mod disparity_png;
 pub mod error;
+pub mod evaluation;
 pub mod flo;
 pub mod flow_png;
 pub mod given;

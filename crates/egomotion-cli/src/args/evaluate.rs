@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use egomotion::metrics::{Alignment, Delta};
+use egomotion_io::evaluation::Options;
+use egomotion_io::trajectory::Format;
 
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
@@ -38,11 +40,21 @@ pub struct EvaluateArgs {
 }
 
 impl EvaluateArgs {
-    /// Of each component of φ, in metres and radians.
-    pub fn truth_sigma(&self) -> [f64; 6] {
-        let (t, degrees) = self.truth_sigma.unwrap_or_default();
-        let r = degrees.to_radians();
-        [t, t, t, r, r, r]
+    /// How the trajectories are to be compared.
+    pub fn options(&self) -> Options {
+        let own = Options::default();
+        Options {
+            format: self.format.map(Into::into),
+            by_time: self.associate == AssociateArg::Time,
+            largest_gap_s: self.max_diff,
+            alignment: self.align.into(),
+            lengths_m: self.lengths.clone().unwrap_or(own.lengths_m),
+            deltas: self.delta.clone(),
+            truth_sigma: self.truth_sigma.map_or(own.truth_sigma, |(t, degrees)| {
+                let r = degrees.to_radians();
+                [t, t, t, r, r, r]
+            }),
+        }
     }
 }
 
@@ -55,24 +67,6 @@ pub enum AlignArg {
     Se3,
     /// Also its scale.
     Sim3,
-}
-
-impl AlignArg {
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Se3 => "se3",
-            Self::Sim3 => "sim3",
-        }
-    }
-
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::None => "as given",
-            Self::Se3 => "laid over the truth",
-            Self::Sim3 => "laid over the truth and scaled",
-        }
-    }
 }
 
 impl From<AlignArg> for Alignment {
@@ -96,19 +90,7 @@ pub enum AssociateArg {
 
 /// A distance between poses: 1f, 0.5s, 10m.
 fn delta(text: &str) -> Result<(String, Delta), String> {
-    let unit = text.chars().last().ok_or("give a distance such as 1f, 1s or 10m")?;
-    let number = &text[..text.len() - unit.len_utf8()];
-    let positive = |value: f64| {
-        if value.is_finite() && value > 0.0 { Ok(value) } else { Err("must be positive".into()) }
-    };
-    let value = || number.parse::<f64>().map_err(|e| format!("{e}")).and_then(positive);
-    let delta = match unit {
-        'f' => Delta::Frames(super::positive(number)?),
-        's' => Delta::Seconds(value()?),
-        'm' => Delta::Metres(value()?),
-        _ => return Err("give a distance such as 1f, 1s or 10m".into()),
-    };
-    Ok((text.to_owned(), delta))
+    Ok((text.to_owned(), text.parse()?))
 }
 
 /// Two numbers that are not negative.
@@ -129,4 +111,14 @@ pub enum FormatArg {
     Kitti,
     /// EuRoC's CSV: nanoseconds, position, quaternion with w first.
     Euroc,
+}
+
+impl From<FormatArg> for Format {
+    fn from(format: FormatArg) -> Self {
+        match format {
+            FormatArg::Tum => Self::Tum,
+            FormatArg::Kitti => Self::Kitti,
+            FormatArg::Euroc => Self::Euroc,
+        }
+    }
 }

@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::simulate::check_size;
 use crate::study::StudyCommand;
 
-pub use evaluate::{AlignArg, AssociateArg, EvaluateArgs, FormatArg};
+pub use evaluate::EvaluateArgs;
 pub use run::{ApproachArg, CloudArg, EstimatorArg, MapFormat, MethodArg, ObserveArg, RunArgs, SensorArg};
 
 /// 3D motion, depth velocity and time to impact from stereo, each with an uncertainty that can be trusted.

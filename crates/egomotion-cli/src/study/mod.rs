@@ -67,7 +67,7 @@ fn one_setting(args: &TableArgs) -> OneSetting {
             std_track_px: args.std,
             features: args.features,
         },
-        draws: args.laboratory.draws.unwrap_or(DRAWS),
+        draws: args.laboratory.draws.unwrap_or(OneSetting::default().draws),
         seed: args.laboratory.seed,
     }
 }
@@ -103,9 +103,6 @@ fn efficiency(args: &EfficiencyArgs) -> Efficiency {
         seed: args.laboratory.seed,
     }
 }
-
-/// Draws of a single setting where none are asked for.
-const DRAWS: usize = 40;
 
 /// Run one study into its folder.
 fn alone<S: egomotion::study::Study>(args: &LaboratoryArgs, study: &S) -> Result<Ending> {

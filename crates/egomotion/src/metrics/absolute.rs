@@ -17,6 +17,17 @@ pub enum Alignment {
     Sim3,
 }
 
+impl Alignment {
+    /// Its name in files and options.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Se3 => "se3",
+            Self::Sim3 => "sim3",
+        }
+    }
+}
+
 /// A rigid motion with a scale: p ↦ scale · rotation · p + translation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Similarity {

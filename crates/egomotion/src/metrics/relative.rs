@@ -1,5 +1,7 @@
 //! Errors of relative motions: from frame to frame, or over a time or a length of path.
 
+use std::str::FromStr;
+
 use nalgebra::Matrix3;
 
 use super::{quantile, root_mean_square};
@@ -42,6 +44,29 @@ pub enum Delta {
     Seconds(f64),
     /// At least such a length of the true path, in metres.
     Metres(f64),
+}
+
+impl FromStr for Delta {
+    type Err = &'static str;
+
+    /// A number of frames, seconds or metres: `1f`, `0.5s`, `10m`.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        const KINDS: &str = "give a distance such as 1f, 1s or 10m";
+        let unit = text.chars().last().ok_or(KINDS)?;
+        let number = &text[..text.len() - unit.len_utf8()];
+        let positive = |value: f64| value.is_finite() && value > 0.0;
+        let value =
+            || number.parse().ok().filter(|&value| positive(value)).ok_or("must be a positive number");
+        match unit {
+            'f' => match number.parse() {
+                Ok(frames) if frames > 0 => Ok(Self::Frames(frames)),
+                _ => Err("must be a whole number of at least 1"),
+            },
+            's' => value().map(Self::Seconds),
+            'm' => value().map(Self::Metres),
+            _ => Err(KINDS),
+        }
+    }
 }
 
 /// Pairs of frames that follow each other at a distance `delta`: each begins where the last one ends.

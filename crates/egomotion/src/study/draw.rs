@@ -16,6 +16,7 @@ const LEAST_SIGMA_PX: f64 = 1e-4;
 
 /// What the measurements suffer from: the parameters of the six sweeps but STEP.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Measuring {
     /// ROUND: levels of disparity for each pixel; `None` is infinite.
     pub round: Option<u32>,
@@ -27,6 +28,12 @@ pub struct Measuring {
     pub std_track_px: f64,
     /// FEATURES: number of tracked features in the discrete form.
     pub features: usize,
+}
+
+impl Default for Measuring {
+    fn default() -> Self {
+        Self::real()
+    }
 }
 
 impl Measuring {

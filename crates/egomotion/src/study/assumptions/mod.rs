@@ -13,9 +13,16 @@ pub use instantaneous::InstantaneousError;
 
 /// `study assumptions`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Assumptions {
     /// Seed of the noise.
     pub seed: u64,
+}
+
+impl Default for Assumptions {
+    fn default() -> Self {
+        Self { seed: 1 }
+    }
 }
 
 /// What a part finds.

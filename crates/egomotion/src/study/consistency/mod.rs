@@ -25,7 +25,8 @@ use pair::Pair;
 const PAIRS_PER_PART: usize = 10;
 
 /// The whole pipeline on random pairs of named sequences.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Consistency {
     /// Names of the sequences.
     pub sequences: Vec<String>,

@@ -61,6 +61,7 @@ pub enum EfficiencyError {
 
 /// The study of efficiency.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Efficiency {
     /// Sequences: A, B, C, lab-A … lab-M.
     pub sequences: Vec<String>,

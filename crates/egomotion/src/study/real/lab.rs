@@ -1,7 +1,7 @@
 //! The manipulator's sequences through the whole image pipeline, judged by exact truth.
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::measured::{Measured, Unmeasured};
@@ -18,7 +18,8 @@ use crate::study::{Publication, Study};
 ///
 /// A draw is three stereo frames at exp((k − s) φ), exp(k φ), exp((k + s) φ) for a reference pose k and the step s,
 /// with sensor noise of its own; a seed is a texture. What is matched in the images knows nothing of the truth.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct LabStudy {
     /// Names of the sequences.
     pub sequences: Vec<String>,

@@ -187,6 +187,7 @@ fn rows<'a>(id: &str, title: &str, caption: &str, records: impl Iterator<Item = 
 
 /// The six sweeps for some sequences, at both baselines.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Sensitivity {
     /// Sequences: `A`, `B`, `C`.
     pub sequences: Vec<String>,
@@ -273,6 +274,7 @@ impl Study for Sensitivity {
 
 /// One setting alone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct OneSetting {
     /// The sequence: `A`, `B`, `C`, or any other of [`Sequence::names`].
     pub sequence: String,
@@ -284,6 +286,13 @@ pub struct OneSetting {
     pub draws: usize,
     /// Seed of the draws.
     pub seed: u64,
+}
+
+impl Default for OneSetting {
+    /// Sequence C at the baseline `real`.
+    fn default() -> Self {
+        Self { sequence: "C".to_owned(), step: 1.0, measuring: Measuring::default(), draws: 40, seed: 1 }
+    }
 }
 
 impl OneSetting {

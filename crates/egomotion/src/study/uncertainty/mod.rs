@@ -35,6 +35,7 @@ const LEVELS: [usize; 4] = [4, 8, 16, 32];
 
 /// `study uncertainty`: the table under (51), Figures 3 to 6, and each variance formula against draws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Uncertainty {
     /// Draws of each case, at least two.
     pub draws: usize,

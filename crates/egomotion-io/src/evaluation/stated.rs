@@ -1,47 +1,52 @@
 //! Whether the stated uncertainty is true: φ of `motion.csv` against true poses.
 
-use anyhow::Result;
+use std::path::Path;
+
 use egomotion::geometry::{RigidMotion, Twist};
 use egomotion::metrics::{Coverage, Nees, associate};
-use egomotion_io::motion_table::{self, MotionRow};
 use serde_json::{Value, json};
 
-use crate::args::EvaluateArgs;
-use crate::evaluate::trajectories::poses;
+use super::Options;
+use super::trajectories::poses;
+use crate::IoError;
+use crate::motion_table::{self, MotionRow};
 
 /// NEES and coverage of φ.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Stated {
-    nees: Nees,
-    components: Coverage,
+    /// Over whole motions.
+    pub nees: Nees,
+    /// Of the components' 95 % intervals.
+    pub components: Coverage,
 }
 
 impl Stated {
     /// `None` where the estimate is not the folder of a run, or the truth has no time stamps.
-    pub fn read(args: &EvaluateArgs) -> Result<Option<Self>> {
-        let file = args.estimate.join("motion.csv");
+    pub(super) fn read(estimate: &Path, truth: &Path, options: &Options) -> Result<Option<Self>, IoError> {
+        let file = estimate.join("motion.csv");
         if !file.is_file() {
             return Ok(None);
         }
-        let truth = poses(&args.truth, None)?;
+        let truth = poses(truth, None)?;
         let Some(times) = truth.iter().map(|pose| pose.time_s).collect::<Option<Vec<f64>>>() else {
             return Ok(None);
         };
         let truth: Vec<RigidMotion> = truth.iter().map(|pose| pose.world_from_camera).collect();
         let mut stated = Self { nees: Nees::default(), components: Coverage::default() };
         for row in motion_table::read(&file)? {
-            stated.add(&row, &times, &truth, args);
+            stated.add(&row, &times, &truth, options);
         }
         Ok((stated.nees.count > 0).then_some(stated))
     }
 
-    fn add(&mut self, row: &MotionRow, times_s: &[f64], truth: &[RigidMotion], args: &EvaluateArgs) {
+    fn add(&mut self, row: &MotionRow, times_s: &[f64], truth: &[RigidMotion], options: &Options) {
         let Some(motion) = row.motion.as_ref().filter(|motion| motion.is_complete()) else { return };
         let Some(dt_s) = row.dt_s else { return };
-        let at = associate(&[row.time_s - dt_s, row.time_s], times_s, args.max_diff);
+        let at = associate(&[row.time_s - dt_s, row.time_s], times_s, options.largest_gap_s);
         let [(_, before), (_, after)] = at[..] else { return };
         let phi: Twist = truth[after].inverse().after(&truth[before]).log();
         let mut stated = motion.phi;
-        for (i, sigma) in args.truth_sigma().into_iter().enumerate() {
+        for (i, sigma) in options.truth_sigma.iter().enumerate() {
             stated.cov[(i, i)] += sigma * sigma;
         }
         self.nees.add(&stated, &phi.vector());
@@ -51,17 +56,8 @@ impl Stated {
         }
     }
 
-    pub fn json(&self) -> Value {
+    pub(super) fn json(&self) -> Value {
         json!({ "nees_over_6": self.nees.per_degree(), "coverage_95": self.components.share(),
                 "motions": self.nees.count })
-    }
-
-    pub fn text(&self) -> String {
-        format!(
-            "stated uncertainty: NEES/6 {:.2}; {:.1} % of {} components in their 95 % interval\n",
-            self.nees.per_degree().unwrap_or(f64::NAN),
-            100.0 * self.components.share().unwrap_or(f64::NAN),
-            self.components.total()
-        )
     }
 }
