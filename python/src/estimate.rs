@@ -120,7 +120,7 @@ impl Estimate {
     fn __repr__(&self) -> String {
         let k = self.theta.len();
         let parts =
-            (0..k).map(|i| format!("{:.6} ± {:.6}", self.theta[i], self.covariance[i * (k + 1)].sqrt()));
+            (0..k).map(|i| format!("{:.5e} ± {:.1e}", self.theta[i], self.covariance[i * (k + 1)].sqrt()));
         format!("Estimate({})", parts.collect::<Vec<_>>().join(", "))
     }
 }

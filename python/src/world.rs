@@ -75,20 +75,21 @@ impl Sequence {
 
     /// Left and right image (H, W), float32 grey levels 0 … 255, of frame k; `samples`² rays a pixel.
     ///
-    /// The sensor's noise is of `seed`; None leaves it out.
-    #[pyo3(signature = (k, *, seed = Some(1), samples = 4))]
+    /// The sensor's `noise` is of `seed`.
+    #[pyo3(signature = (k, *, noise = true, seed = 1, samples = 4))]
     fn render<'py>(
         &self,
         py: Python<'py>,
         k: usize,
-        seed: Option<u64>,
+        noise: bool,
+        seed: u64,
         samples: usize,
     ) -> PyResult<arrays::Two<'py, f32>> {
         if !(1..=16).contains(&samples) {
             return Err(PyValueError::new_err("samples must be 1 to 16"));
         }
         let sensor =
-            seed.map_or_else(sim::SensorNoise::none, |seed| sim::SensorNoise::default().with_seed(seed));
+            if noise { sim::SensorNoise::default().with_seed(seed) } else { sim::SensorNoise::none() };
         let view = self.0.view(k).ok_or_else(past_the_end)?;
         let images = py.detach(|| sensor.photograph(&view, samples, k as u64));
         Ok((arrays::plane(py, &images.left)?, arrays::plane(py, &images.right)?))

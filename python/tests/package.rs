@@ -1,0 +1,75 @@
+//! The wheel: built, installed in a fresh virtual environment, tested there by `tests/*.py`.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// What the tests need besides the wheel's own dependencies.
+const NEEDED: [&str; 5] = ["maturin>=1.9,<2", "numpy", "pytest>=8", "hypothesis>=6", "mypy>=1.11"];
+
+#[test]
+fn the_wheel_passes_its_tests() {
+    let Some(python) = python() else {
+        println!("SKIPPED for want of Python 3.10 or newer with the module venv");
+        return;
+    };
+    let folder = tempfile::Builder::new().prefix("egomotion-wheel").tempdir().unwrap();
+    let environment = folder.path().join("environment");
+    let made = Command::new(&python).args(["-m", "venv"]).arg(&environment).output().unwrap();
+    if !made.status.success() {
+        println!("SKIPPED for want of Python 3.10 or newer with the module venv");
+        return;
+    }
+    let bin = environment.join(if cfg!(windows) { "Scripts" } else { "bin" });
+    let own = bin.join("python");
+    let installed = Command::new(&own).args(["-m", "pip", "install", "-q"]).args(NEEDED).output().unwrap();
+    if !installed.status.success() {
+        println!("SKIPPED for want of Python packages: {}", last_line(&installed));
+        return;
+    }
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let wheels = folder.path().join("wheels");
+    let build = |command: &mut Command| {
+        // The profile of tests is optimised, and its dependencies are built.
+        command.args(["build", "--profile", "dev", "--locked", "--out"]).arg(&wheels).current_dir(here);
+    };
+    passes(&bin.join("maturin"), build);
+    let wheel = std::fs::read_dir(&wheels).unwrap().next().unwrap().unwrap().path();
+    let name = wheel.file_name().unwrap().to_str().unwrap();
+    assert!(name.contains("cp310-abi3"), "{name}");
+    passes(&own, |command| {
+        command.args(["-m", "pip", "install", "-q"]).arg(&wheel);
+    });
+    // From a folder of its own, so that nothing but the wheel can be imported.
+    let tests = here.join("tests");
+    passes(&own, |command| {
+        command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]).arg(&tests).current_dir(folder.path());
+    });
+    passes(&own, |command| {
+        command.args(["-m", "mypy", "--strict"]).arg(&tests).current_dir(folder.path());
+    });
+    passes(&own, |command| {
+        command.args(["-m", "mypy.stubtest", "egomotion"]).current_dir(folder.path());
+    });
+}
+
+/// A Python that is new enough.
+fn python() -> Option<PathBuf> {
+    let new_enough = "import sys, venv; sys.exit(sys.version_info < (3, 10))";
+    let works = |name: &&str| {
+        Command::new(name).args(["-c", new_enough]).output().is_ok_and(|output| output.status.success())
+    };
+    ["python3", "python"].iter().find(|name| works(name)).map(PathBuf::from)
+}
+
+fn passes(program: &Path, prepare: impl FnOnce(&mut Command)) {
+    let mut command = Command::new(program);
+    prepare(&mut command);
+    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let words = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    assert!(output.status.success(), "{command:?}\n{}\n{}", words(&output.stdout), words(&output.stderr));
+}
+
+fn last_line(output: &Output) -> String {
+    let words = String::from_utf8_lossy(&output.stderr);
+    words.lines().rfind(|line| !line.trim().is_empty()).unwrap_or_default().to_owned()
+}

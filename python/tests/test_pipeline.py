@@ -1,0 +1,162 @@
+"""Images in, motion out: the package's own face on the pipeline, the front end, the studies."""
+
+import json
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import egomotion as em
+
+C = em.Sequence("C", frames=3)
+FRAMES = [C.render(k, samples=2) for k in range(3)]
+
+
+def pushed(motion: em.StereoMotion, kind: type = np.float32) -> list[em.FrameMotion]:
+    return [
+        motion.push(left.astype(kind), right.astype(kind), 0.1 * k) for k, (left, right) in enumerate(FRAMES)
+    ]
+
+
+def inside(answer: em.FrameMotion, truth: Any, sigmas: float = 4.0) -> bool:
+    sigma = np.sqrt(np.diag(answer.covariance))
+    return bool(np.all(np.abs(answer.phi - truth) < sigmas * sigma))
+
+
+def test_motion_and_maps_of_a_rendered_sequence() -> None:
+    answers = pushed(em.StereoMotion(C.rig))
+    assert [answer.status for answer in answers] == ["first", "ok", "ok"]
+    assert answers[0].dt is None and answers[0].reason == "no earlier frame"
+    for k, answer in enumerate(answers[1:]):
+        assert inside(answer, C.phi(k))
+        assert answer.frame == k + 1 and answer.dt == pytest.approx(0.1)
+        np.testing.assert_allclose(answer.covariance, answer.covariance.T, rtol=1e-12)
+        truth = C.truth(k)
+        for found, sigma, true in [
+            (answer.disparity, answer.disparity_sigma, truth["disparity"]),
+            (answer.depth_velocity, answer.depth_velocity_sigma, truth["depth_velocity"]),
+        ]:
+            assert found is not None and sigma is not None and found.shape == (240, 320)
+            z = (found - true) / sigma
+            known = np.isfinite(z)
+            assert known.mean() > 0.8
+            assert (np.abs(z[known]) < 2).mean() > 0.85
+        assert answer.flow is not None and answer.flow_covariance is not None
+        assert np.nanmedian(np.abs(answer.flow - truth["flow"])) < 0.1
+        assert answer.looming is not None and answer.impact_map is not None
+        near = answer.looming > 0
+        np.testing.assert_allclose(answer.impact_map[near], 1 / answer.looming[near], rtol=1e-5)
+        assert set(answer.stages) == {"pyramids", "disparity", "tracks", "flow", "estimate", "maps"}
+
+
+def test_types_threads_and_repetition_give_the_same_bits() -> None:
+    first = pushed(em.StereoMotion(C.rig, observe="sparse"))[-1]
+    for motion, kind in [
+        (em.StereoMotion(C.rig, observe="sparse", threads=1), np.float32),
+        (em.StereoMotion(C.rig, observe="sparse"), np.uint8),
+        (em.StereoMotion(C.rig, observe="sparse"), np.uint16),
+    ]:
+        other = pushed(motion, kind)[-1]
+        assert first.phi.tobytes() == other.phi.tobytes()
+        assert first.covariance.tobytes() == other.covariance.tobytes()
+    assert first.disparity is None
+
+
+def test_settings_reach_the_pipeline() -> None:
+    default = em.default_config()
+    assert default["method"] == "ml" and default["tracks"]["corners"] > 0
+    answers = {
+        method: pushed(em.StereoMotion(C.rig, method=method, observe="sparse"))[-1].phi
+        for method in ("ml", "dv", "joint", "rigid")
+    }
+    assert len({phi.tobytes() for phi in answers.values()}) == 4
+    few = pushed(em.StereoMotion(C.rig, observe="sparse", tracks={"corners": 100}))[-1]
+    assert few.motion is not None and few.motion.rows < 150
+
+
+def test_own_disparity_takes_the_place_of_ours() -> None:
+    maps = [em.disparity(*pair) for pair in FRAMES[:2]]
+    own = em.StereoMotion(C.rig)
+    for k, ((left, _), (shift, sigma)) in enumerate(zip(FRAMES, maps)):
+        answer = own.push(left, None, 0.1 * k, disparity=shift, disparity_sigma=sigma)
+    assert answer.status == "ok" and answer.disparity is not None
+    assert np.nanmax(np.abs(answer.disparity - maps[0][0])) == 0
+    assert np.abs(answer.phi - C.phi(0)).max() < 1e-3
+
+
+def test_depth_camera() -> None:
+    rig = C.rig
+    motion = em.RgbdMotion(rig.focal, rig.centre, rig.size, noise="exact", observe="sparse")
+    for k in range(2):
+        answer = motion.push(FRAMES[k][0], C.truth(k)["depth"], 0.1 * k)
+    assert answer.status == "ok"
+    assert np.abs(answer.phi - C.phi(0)).max() < 5e-4
+
+
+def test_parts_of_the_front_end_lead_to_phi() -> None:
+    tracks = em.track(FRAMES[0], FRAMES[1], C.rig)
+    assert len(tracks) > 300 and tracks.before_cov.shape == (len(tracks), 3, 3)
+    found, cost = em.maximum_likelihood(tracks, C.rig, block_px=48)
+    assert cost > 0 and found.observed.all() and len(found.undetermined_words) == 0
+    assert np.all(np.abs(found.theta - C.phi(0)) < 4 * found.sigma)
+    flow, cov = em.flow(FRAMES[0][0], FRAMES[1][0])
+    error = np.abs(flow - C.truth(0)["flow"])
+    assert flow.shape == (240, 320, 2) and cov.shape == (240, 320, 3) and np.nanmedian(error) < 0.1
+
+
+def test_what_is_not_determined_is_said() -> None:
+    # Points on a line through the camera's axis do not show a turn about it.
+    p = np.stack([np.zeros(40), np.zeros(40), np.linspace(2, 9, 40)], axis=1)
+    xyd = C.rig.project(p)
+    tracks = em.StereoTracks(xyd, xyd, np.full(3, 0.01), np.full(3, 0.01))
+    found, _ = em.maximum_likelihood(tracks, C.rig)
+    assert not found.observed[5] and np.isnan(found.theta[5]) and np.isinf(found.covariance[5, 5])
+    assert found.undetermined_words == ["turn about z"]
+
+
+def test_two_threads_of_python_work_at_a_time() -> None:
+    """The interpreter is free while frames are worked on."""
+    ticks = 0
+    done = threading.Event()
+
+    def work() -> None:
+        pushed(em.StereoMotion(C.rig, threads=1))
+        done.set()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    while not done.wait(0.001):
+        ticks += 1
+    thread.join()
+    assert ticks > 10
+
+
+def test_a_study_is_the_sum_of_its_parts() -> None:
+    study = em.Study("sensitivity", sequences=["C"], draws=1)
+    assert study.settings == {"sequences": ["C"], "draws": 1, "seed": 1}
+    table = em.Study("table", draws=4, measuring={"features": 128})
+    backwards = [table.run(part) for part in reversed(range(len(table.parts)))]
+    records = [record for part in reversed(backwards) for record in part]
+    assert json.loads(records[0])["sequence"] == "C"
+    assert table.publish(records) == table.tables()
+    rows = table.tables()["table"]
+    assert len({len(column) for column in rows.values()}) == 1 and "sequence" in rows
+    with pytest.raises(ValueError):
+        table.publish(["{}"])
+
+
+def test_evaluate(tmp_path: Path) -> None:
+    truth, estimate = tmp_path / "truth.txt", tmp_path / "estimate.txt"
+    truth.write_text("".join(f"{0.1 * k} {k} 0 0 0 0 0 1\n" for k in range(12)))
+    estimate.write_text("".join(f"{0.1 * k} {1.01 * k} 0 0 0 0 0 1\n" for k in range(12)))
+    found = em.evaluate(estimate, truth, align="none", lengths=[5.0], delta=["2f"])
+    assert found["frames"] == 12 and found["t_rmse_m"] == pytest.approx(0.01)
+    # KITTI's segments end at the first pose beyond the length: here six steps of 1 cm each for 5 m.
+    assert found["drift_percent"] == pytest.approx(6 / 5)
+    assert found["relative"][0]["translation_m"]["mean"] == pytest.approx(0.02)
+    with pytest.raises(em.ReadError, match="nowhere.txt"):
+        em.evaluate(tmp_path / "nowhere.txt", truth)
+    with pytest.raises(ValueError, match='delta "2x"'):
+        em.evaluate(estimate, truth, delta=["2x"])
