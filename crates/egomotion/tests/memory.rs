@@ -76,9 +76,8 @@ fn images_go_on_to_the_same_bits() {
 fn a_reference_that_is_lost_leaves_the_pipeline_as_it_was() {
     let sequence = sequence();
     let frames = frames(&sequence);
-    let begin = || {
-        StereoMotion::new(sequence.rig, Config { observe: Observe::Sparse, ..Config::default() }).unwrap()
-    };
+    let begin =
+        || StereoMotion::new(sequence.rig, Config { observe: Observe::Sparse, ..Config::default() }).unwrap();
     let mut whole = begin();
     whole.push(frames[0].clone());
     let memory = whole.memory();
