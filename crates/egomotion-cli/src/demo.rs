@@ -34,7 +34,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
     let folder = ResultFolder::create(&out)?;
     let sequence = Sequence::named("demo", None, None, 1.0).context("the demo's scene is missing")?;
     let noise = SensorNoise::default().with_seed(NOISE_SEED);
-    let stop = stop_signal();
+    let stop = stop_signal("frame");
     let session = Session {
         rig: sequence.rig,
         config: &config,
@@ -53,6 +53,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
     writeln!(stdout, "{}", heading())?;
     let mut verdicts = Verdicts::default();
     let outcome = session.run(
+        None,
         &stop,
         |k| (k < sequence.frames()).then(|| render(&sequence, &noise, k)),
         |row| {
@@ -95,6 +96,7 @@ fn render(sequence: &Sequence, noise: &SensorNoise, k: usize) -> Fetched {
             .ok_or(Unanswered::First),
         truth: sequence.world_from_left(k),
         decode_ms: start.elapsed().as_secs_f64() * 1e3,
+        bytes: 0,
     }
 }
 

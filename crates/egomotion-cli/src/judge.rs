@@ -5,7 +5,7 @@ use egomotion::geometry::{Field, StereoRig};
 use egomotion::metrics::{self, Nees};
 use egomotion::pipeline::stereo::DenseResults;
 use egomotion_io::source::TruthMaps;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::session::Outcome;
 
@@ -49,7 +49,7 @@ impl MotionVerdict {
 }
 
 /// Maps against true ones, over the pixels that have both.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct MapVerdict {
     /// Share of the true pixels that have an answer.
     pub answered: f64,

@@ -7,6 +7,7 @@ mod demo;
 mod evaluate;
 mod feed;
 mod info;
+mod journal;
 mod judge;
 mod maps;
 mod memory;

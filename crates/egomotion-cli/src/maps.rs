@@ -58,6 +58,14 @@ impl MapFiles {
         Ok(())
     }
 
+    /// Remove what a killed run left half written in those folders.
+    pub fn sweep(&self, out: &Path) -> Result<()> {
+        for name in FOLDERS.into_iter().chain(["cloud"]) {
+            write::sweep(&out.join(name))?;
+        }
+        Ok(())
+    }
+
     /// Write disparity alone.
     pub fn write_disparity(&self, out: &Path, index: usize, map: &DisparityMap) -> Result<()> {
         for shown in [

@@ -13,42 +13,47 @@ use egomotion::observe::{DisparityMap, DisparityMatcher};
 use egomotion::pipeline::Config;
 use egomotion_io::motion_table::{self, MotionRow};
 use egomotion_io::source::{Sequence, Source};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::args::{MapFormat, RunArgs};
 use crate::feed::Reader;
 use crate::maps::MapFiles;
 use crate::results::ResultFolder;
+use crate::run::complete_before;
+use crate::run::resume::{self, Settings};
+use crate::summary::Word;
 use crate::{Ending, terminal};
 
 /// `status` of a pair.
 const NO_MOTION: &str = "no_motion";
 
 /// `summary.json` of a pair.
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 struct PairSummary {
-    version: &'static str,
+    version: Word,
     source: String,
-    status: &'static str,
+    status: Word,
     frames: usize,
     complete: bool,
     /// Without it disparity stays in pixels.
     rig: Option<StereoRig>,
+    options: Value,
     config: Config,
     seed: u64,
-    counts: BTreeMap<&'static str, usize>,
-    stages_ms: BTreeMap<&'static str, f64>,
+    counts: BTreeMap<Word, usize>,
+    stages_ms: BTreeMap<Word, f64>,
     frame_ms: f64,
     wall_s: f64,
     /// Against the source's own truth.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     disparity: Option<DisparityVerdict>,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     error: Option<String>,
 }
 
 /// Disparity against the true one, over the pixels that have a truth.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct DisparityVerdict {
     /// Share of them with an answer.
     answered: f64,
@@ -67,6 +72,8 @@ struct DisparityVerdict {
 struct Index {
     version: &'static str,
     source: String,
+    options: Value,
+    config: Config,
     complete: bool,
     scenes: BTreeMap<String, PairSummary>,
 }
@@ -80,21 +87,35 @@ pub fn run(
     stop: &AtomicBool,
 ) -> Result<Ending> {
     let mut scenes = BTreeMap::new();
-    let single = source.sequences.len() == 1;
+    let count = source.sequences.len();
+    let single = count == 1;
     let folder = ResultFolder::create(out)?;
+    let rig = source.sequences.first().filter(|_| single).and_then(|pair| pair.rig.as_ref());
+    let settings = Settings { options: args, config, rig, cameras: None, frames: count };
+    let Some((mut journal, mut known)) = resume::open(out, &settings.head()?, args.resume)? else {
+        return complete_before(args, out);
+    };
     let mut complete = true;
     for pair in &source.sequences {
+        if let Some(summary) = known.remove(&pair.name).and_then(|mut summary| summary.pop()) {
+            scenes.insert(pair.name.clone(), summary);
+            continue;
+        }
         if stop.load(Ordering::Relaxed) {
+            // What is known of later pairs is listed too.
             complete = false;
-            break;
+            continue;
         }
         let place = if single { out.to_owned() } else { out.join(&pair.name) };
         let summary = match matched(args, config, pair, &place) {
-            Ok(summary) => summary,
+            Ok(summary) => {
+                journal.add(&pair.name, std::slice::from_ref(&summary))?;
+                summary
+            }
             // One pair that cannot be read does not end the others.
             Err(error) if !single => {
                 terminal::tell(format_args!("{}: {error:#}", pair.name));
-                failed(args, config, pair, &error)
+                failed(args, config, pair, &error)?
             }
             Err(error) => return Err(error),
         };
@@ -110,13 +131,20 @@ pub fn run(
         }
     } else {
         let source = source.path.display().to_string();
-        let index = Index { version: env!("CARGO_PKG_VERSION"), source, complete, scenes };
+        let (options, config) = (serde_json::to_value(args)?, config.clone());
+        let index = Index { version: env!("CARGO_PKG_VERSION"), source, options, config, complete, scenes };
         folder.write_json("summary.json", &index)?;
         print_json(args, &index)?;
     }
-    Ok(if complete { Ending::Done } else { Ending::Interrupted })
+    if complete {
+        journal.remove()?;
+        return Ok(Ending::Done);
+    }
+    terminal::tell("stopped before the last pair; the same command with --resume goes on");
+    Ok(Ending::Interrupted)
 }
 
+/// A pair's disparity into its folder.
 fn matched(args: &RunArgs, config: &Config, pair: &Sequence, out: &Path) -> Result<PairSummary> {
     let start = Instant::now();
     let files = pair.frames.first().ok_or_else(|| anyhow!("{}: no pair", pair.name))?;
@@ -141,39 +169,40 @@ fn matched(args: &RunArgs, config: &Config, pair: &Sequence, out: &Path) -> Resu
     };
     folder.write("motion.csv", motion_table::text(&[row]).as_bytes())?;
     let summary = PairSummary {
-        stages_ms: [("decode", decode_ms), ("disparity", disparity_ms)].into(),
+        stages_ms: [("decode".into(), decode_ms), ("disparity".into(), disparity_ms)].into(),
         frame_ms: decode_ms + disparity_ms,
         wall_s: start.elapsed().as_secs_f64(),
         disparity: verdict,
-        ..empty(args, config, pair)
+        ..empty(args, config, pair)?
     };
     folder.write_json("summary.json", &summary)?;
     Ok(summary)
 }
 
-fn empty(args: &RunArgs, config: &Config, pair: &Sequence) -> PairSummary {
-    PairSummary {
-        version: env!("CARGO_PKG_VERSION"),
+fn empty(args: &RunArgs, config: &Config, pair: &Sequence) -> Result<PairSummary> {
+    Ok(PairSummary {
+        version: env!("CARGO_PKG_VERSION").into(),
         source: args.source.display().to_string(),
-        status: NO_MOTION,
+        status: NO_MOTION.into(),
         frames: 1,
         complete: true,
         rig: pair.rig,
+        options: serde_json::to_value(args)?,
         config: config.clone(),
         seed: config.seed,
-        counts: [(NO_MOTION, 1)].into(),
+        counts: [(NO_MOTION.into(), 1)].into(),
         stages_ms: BTreeMap::new(),
         frame_ms: 0.0,
         wall_s: 0.0,
         disparity: None,
         error: None,
-    }
+    })
 }
 
 /// What stands in the index for a pair that failed.
-fn failed(args: &RunArgs, config: &Config, pair: &Sequence, error: &anyhow::Error) -> PairSummary {
-    let error = Some(format!("{error:#}"));
-    PairSummary { status: "bad_image", counts: [("bad_image", 1)].into(), error, ..empty(args, config, pair) }
+fn failed(args: &RunArgs, config: &Config, pair: &Sequence, error: &anyhow::Error) -> Result<PairSummary> {
+    let (status, error) = (Word::from("bad_image"), Some(format!("{error:#}")));
+    Ok(PairSummary { counts: [(status.clone(), 1)].into(), status, error, ..empty(args, config, pair)? })
 }
 
 /// `None` where the sizes differ or nothing has both a truth and an answer.

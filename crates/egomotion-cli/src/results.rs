@@ -36,6 +36,11 @@ impl ResultFolder {
         &self.path
     }
 
+    /// Remove what a killed run left half written.
+    pub fn sweep(&self) -> Result<()> {
+        Ok(write::sweep(&self.path)?)
+    }
+
     /// Write one file.
     pub fn write(&self, name: &str, content: &[u8]) -> Result<()> {
         Ok(write::bytes(&self.path.join(name), content)?)

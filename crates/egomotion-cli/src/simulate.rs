@@ -24,7 +24,7 @@ pub fn simulate(args: &SimulateArgs) -> Result<Ending> {
     let name = &world.sequence.name;
     let out: PathBuf = args.out.clone().unwrap_or_else(|| Path::new("egomotion-out").join(name));
     let folder = SequenceFolder::create(&out, world.frames)?;
-    let stop = stop_signal();
+    let stop = stop_signal("frame");
     folder.write_scene(&world)?;
     let bar = progress(world.frames, args.quiet);
     bar.set_message(name.clone());

@@ -1,10 +1,13 @@
 //! `summary.json`: what was run, how it went, and where the time was spent.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use egomotion::geometry::StereoRig;
+use egomotion::geometry::{StereoRectification, StereoRig};
 use egomotion::pipeline::Config;
-use serde::Serialize;
+use egomotion_io::source::{DepthSensor, Sequence};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::judge::{MapVerdict, MotionVerdict};
 use crate::results::status;
@@ -18,10 +21,16 @@ pub struct Summary {
     /// Whether every frame was done.
     pub complete: bool,
     pub rig: StereoRig,
+    /// What the rig was made of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cameras: Option<Cameras>,
+    /// The options of the command that matter to the results and are not in `config`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub options: Option<Value>,
     pub config: Config,
     pub seed: u64,
     /// Rows by status.
-    pub counts: BTreeMap<&'static str, usize>,
+    pub counts: BTreeMap<Word, usize>,
     /// Answered intervals without an obstacle, by reason.
     pub no_obstacle: BTreeMap<&'static str, usize>,
     /// Mean milliseconds per frame.
@@ -43,11 +52,29 @@ pub struct Summary {
     pub truth_maps: Option<MapVerdict>,
 }
 
+/// Raw cameras, and a depth sensor.
+#[derive(Debug, Clone, Serialize)]
+pub struct Cameras {
+    pub raw: Option<StereoRectification>,
+    pub depth: Option<DepthSensor>,
+}
+
+impl Cameras {
+    /// `None` where there is neither.
+    pub fn of(sequence: &Sequence) -> Option<Self> {
+        let cameras = Self { raw: sequence.rectification.clone(), depth: sequence.depth_sensor };
+        (cameras.raw.is_some() || cameras.depth.is_some()).then_some(cameras)
+    }
+}
+
+/// A word of ours, or one that was read.
+pub type Word = Cow<'static, str>;
+
 impl Summary {
     pub fn new(source: String, rig: StereoRig, config: &Config, outcome: &Outcome) -> Self {
         let (mut counts, mut no_obstacle) = (BTreeMap::new(), BTreeMap::new());
         for row in outcome.rows.iter().skip(1) {
-            *counts.entry(status(row)).or_insert(0) += 1;
+            *counts.entry(Word::from(status(row))).or_insert(0) += 1;
             if let (Ok(_), Err(why)) = (&row.motion.motion, &row.motion.obstacle) {
                 *no_obstacle.entry(why.code()).or_insert(0) += 1;
             }
@@ -60,6 +87,8 @@ impl Summary {
             frames: outcome.rows.len(),
             complete: outcome.complete,
             rig,
+            cameras: None,
+            options: None,
             seed: config.seed,
             config: config.clone(),
             counts,
@@ -93,19 +122,22 @@ fn badly_rectified(rows_px: f64) -> Option<String> {
 pub struct Index {
     pub version: &'static str,
     pub source: String,
+    /// As in [`Summary`].
+    pub options: Value,
+    pub config: Config,
     pub complete: bool,
     pub scenes: Vec<SceneEntry>,
 }
 
-#[derive(Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SceneEntry {
     pub scene: String,
     pub frames: usize,
-    pub counts: BTreeMap<&'static str, usize>,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    pub counts: BTreeMap<Word, usize>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth_maps: Option<MapVerdict>,
     /// Why the scene could not be run.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub error: Option<String>,
 }
 

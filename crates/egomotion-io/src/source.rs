@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 
 use egomotion::geometry::{Camera, RigidMotion, StereoRectification, StereoRig};
 use egomotion::pipeline::rgbd::DepthNoise;
+use serde::Serialize;
 
 use crate::IoError;
 pub use true_disparity::{DisparityEncoding, TrueDisparity};
@@ -72,7 +73,7 @@ pub enum Layout {
 /// The depth camera of a sequence, whose depth images lie on the left image's pixels.
 ///
 /// [`Sequence::rig`] is then its rig: where it has no second camera, one with a virtual baseline.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DepthSensor {
     /// How noisy its depth is.
     pub noise: DepthNoise,

@@ -38,6 +38,27 @@ pub fn atomically(
     written().map_err(|error| IoError::system(path, "write", &error))
 }
 
+/// Remove what writing left half done in a folder when the program was killed; without the folder nothing.
+///
+/// # Errors
+/// A file cannot be removed, or the folder not be read.
+pub fn sweep(path: &Path) -> Result<(), IoError> {
+    let swept = || -> io::Result<()> {
+        let entries = match fs::read_dir(path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            other => other?,
+        };
+        for entry in entries {
+            let entry = entry?;
+            if entry.file_name().to_string_lossy().starts_with(TEMPORARY) && entry.file_type()?.is_file() {
+                fs::remove_file(entry.path())?;
+            }
+        }
+        Ok(())
+    };
+    swept().map_err(|error| IoError::system(path, "tidy up", &error))
+}
+
 /// Make a folder and those above it.
 ///
 /// # Errors
@@ -46,10 +67,13 @@ pub fn folder(path: &Path) -> Result<(), IoError> {
     fs::create_dir_all(path).map_err(|error| IoError::system(path, "make the folder", &error))
 }
 
+/// How the names of unfinished files begin.
+const TEMPORARY: &str = ".egomotion-";
+
 fn temporary_beside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = Builder::new();
-    builder.prefix(".egomotion-");
+    builder.prefix(TEMPORARY);
     // A temporary file is private by default; a result is as readable as any file of this user.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
@@ -93,6 +117,21 @@ mod tests {
         assert_eq!(names(folder.path()), ["taken"]);
         bytes(&folder.path().join("b.txt"), b"x").unwrap();
         assert!(super::folder(&folder.path().join("b.txt")).is_err());
+    }
+
+    #[test]
+    fn what_a_killed_program_left_is_swept() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [".egomotion-x1y2", ".other", "motion.csv"] {
+            fs::write(folder.path().join(name), "half").unwrap();
+        }
+        super::folder(&folder.path().join(".egomotion-folder")).unwrap();
+        sweep(folder.path()).unwrap();
+        let mut left = names(folder.path());
+        left.sort();
+        assert_eq!(left, [".egomotion-folder", ".other", "motion.csv"]);
+        sweep(&folder.path().join("none")).unwrap();
+        assert!(sweep(&folder.path().join("motion.csv")).unwrap_err().to_string().contains("cannot tidy up"));
     }
 
     #[cfg(unix)]

@@ -20,6 +20,8 @@ pub struct Fetched {
     /// True pose world_from_camera.
     pub truth: Option<RigidMotion>,
     pub decode_ms: f64,
+    /// Size of its files together; 0 where there are none.
+    pub bytes: u64,
 }
 
 /// What is given of one time.
@@ -33,11 +35,12 @@ pub enum Given {
 /// Frames fetched while earlier ones are worked on.
 const AHEAD: usize = 2;
 
-/// Run `work` on frames that `fetch` provides on a thread of its own, in order.
+/// Run `work` on frames from `first` on that `fetch` provides on a thread of its own, in order.
 ///
 /// It ends where `fetch` has no more; `stop` ends the fetching between two frames.
 pub fn with_frames<T>(
     stop: &AtomicBool,
+    first: usize,
     fetch: impl Fn(usize) -> Option<Fetched> + Sync,
     work: impl FnOnce(Receiver<Fetched>) -> T,
 ) -> T {
@@ -45,7 +48,7 @@ pub fn with_frames<T>(
         let (sender, receiver) = sync_channel(AHEAD);
         let fetch = &fetch;
         scope.spawn(move || {
-            for fetched in (0..).map_while(fetch) {
+            for fetched in (first..).map_while(fetch) {
                 // The receiver is gone when the work ended early.
                 if stop.load(Ordering::Relaxed) || sender.send(fetched).is_err() {
                     break;

@@ -74,7 +74,17 @@ impl Reader<'_> {
             frame,
             truth: files.truth,
             decode_ms: start.elapsed().as_secs_f64() * 1e3,
+            bytes: self.bytes(files),
         }
+    }
+
+    /// Size of all files of a frame together.
+    pub fn bytes(&self, files: &FrameFiles) -> u64 {
+        let given = [(self.disparity, given::DISPARITY), (self.flow, given::FLOW)];
+        let given = given.map(|(folder, endings)| given::find(folder?, &files.left, files.index, endings));
+        let own = [Some(&files.left), files.right.as_ref(), files.depth.as_ref()];
+        let all = own.into_iter().flatten().chain(given.iter().flatten());
+        all.filter_map(|file| file.metadata().ok()).map(|about| about.len()).sum()
     }
 
     fn frame(&self, files: &FrameFiles, time_s: f64, last: bool) -> Result<Frame, Unanswered> {

@@ -37,14 +37,17 @@ impl Album {
         width.min(fits.clamp(WIDTHS_PX.0, WIDTHS_PX.1) as usize)
     }
 
-    /// Offer the next frame; its pictures are made only if they will be kept.
-    pub fn offer(&mut self, make: impl FnOnce() -> FramePictures) {
-        if self.pictures.len() == MOST_FRAMES && self.is_due() {
-            self.thin();
-        }
-        if self.is_due() {
-            self.pictures.push(make());
-        }
+    /// Offer the next frame; its pictures are made, and given back too, only if it is their turn.
+    pub fn offer(&mut self, make: impl FnOnce() -> FramePictures) -> Option<FramePictures> {
+        let made = self.accepts().then(make);
+        self.recall(made.clone());
+        made
+    }
+
+    /// The next frame again, with what an earlier album of the same run made of it.
+    pub fn recall(&mut self, made: Option<FramePictures>) {
+        let accepted = self.accepts();
+        self.pictures.extend(made.filter(|_| accepted));
         self.offered += 1;
         while self.bytes() > MOST_BYTES && self.pictures.len() > 1 {
             self.thin();
@@ -63,6 +66,14 @@ impl Album {
 
     fn bytes(&self) -> usize {
         self.pictures.iter().map(FramePictures::bytes).sum()
+    }
+
+    /// Whether it is the next frame's turn; room is made for it.
+    fn accepts(&mut self) -> bool {
+        if self.pictures.len() == MOST_FRAMES && self.is_due() {
+            self.thin();
+        }
+        self.is_due()
     }
 
     fn is_due(&self) -> bool {

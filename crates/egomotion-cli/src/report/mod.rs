@@ -5,6 +5,7 @@
 
 mod album;
 mod body;
+mod bytes;
 mod charts;
 mod data;
 mod impact;

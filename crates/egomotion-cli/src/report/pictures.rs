@@ -7,7 +7,9 @@ use egomotion::motion::TimeToImpact;
 use egomotion::pipeline::stereo::DenseResults;
 use jpeg_encoder::{ColorType, Encoder};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
+use super::bytes;
 use crate::chart::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Rgb, Spread, VIRIDIS};
 use crate::chart::raster::{encode, recolour, reduce};
 
@@ -43,20 +45,22 @@ pub struct Quantity {
 }
 
 /// The pictures of one frame.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FramePictures {
     /// The frame shown, by its index in the source: the earlier one of the pair that the maps compare.
     pub frame: usize,
     /// The row of the run whose motion starts at this frame.
     pub row: usize,
     size: (usize, usize),
+    #[serde(with = "bytes")]
     left_jpeg: Vec<u8>,
     maps: Vec<MapPicture>,
 }
 
 /// A map as PNG of palette indices, evenly spread over its own range of coordinates; 0 is missing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct MapPicture {
+    #[serde(with = "bytes")]
     png: Vec<u8>,
     levels: u8,
     /// Coordinates of the first and the last level.

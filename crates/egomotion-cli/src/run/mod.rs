@@ -1,5 +1,7 @@
 //! `egomotion run`: a real sequence in, motion out.
 
+pub mod resume;
+mod scenes;
 mod sequence;
 mod stream;
 
@@ -12,11 +14,9 @@ use egomotion::pipeline::{Config, Observe};
 use egomotion_io::source::{Layout, Source};
 
 use crate::args::RunArgs;
-use crate::pairs;
-use crate::results::ResultFolder;
 use crate::session::stop_signal;
-use crate::summary::{Index, SceneEntry, Summary};
-use crate::{Ending, Usage, terminal, toml_file};
+use crate::summary::{Summary, Word};
+use crate::{Ending, Usage, pairs, terminal, toml_file};
 use sequence::{DoneSequence, run_sequence};
 
 /// Run a source, be it one sequence or a set of scenes.
@@ -26,58 +26,36 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
     if args.source.as_os_str() == "-" {
         return stream::run(args, &config);
     }
-    let source = Source::open_with(&args.source, args.calibration.as_deref())?;
     let out = args.out.clone().unwrap_or_else(|| default_out(&args.source));
-    let stop = stop_signal();
+    if args.resume {
+        resume::expect_run(&out)?;
+    }
+    let source = Source::open_with(&args.source, args.calibration.as_deref())?;
+    let stop = stop_signal("frame");
     if source.layout == Layout::StereoPairs {
         return pairs::run(args, &config, &source, &out, &stop);
     }
-    if !source.layout.is_scene_set() {
-        let done = run_sequence(args, &config, &source.sequences[0], &out, &stop)?;
-        print_result(args, &done.summary, &out)?;
-        answered(&source.path, &done)?;
-        return Ok(ending(done.summary.complete));
+    if source.layout.is_scene_set() {
+        return scenes::run(args, &config, &source, &out, &stop);
     }
-    let mut scenes = Vec::new();
-    let mut complete = true;
-    let folder = ResultFolder::create(&out)?;
-    for scene in &source.sequences {
-        let folder = out.join(&scene.name);
-        let entry = match run_sequence(args, &config, scene, &folder, &stop) {
-            Ok(done) => {
-                if !args.json {
-                    print_result(args, &done.summary, &folder)?;
-                }
-                complete &= done.summary.complete;
-                SceneEntry::done(&scene.name, done.summary)
-            }
-            Err(error) if error.is::<Usage>() => return Err(error),
-            // One scene that cannot be run does not end the others.
-            Err(error) => {
-                terminal::tell(format_args!("scene {}: {error:#}", scene.name));
-                SceneEntry::failed(&scene.name, &error)
-            }
-        };
-        scenes.push(entry);
-        if !complete {
-            break;
-        }
-    }
-    let index = Index {
-        version: env!("CARGO_PKG_VERSION"),
-        source: args.source.display().to_string(),
-        complete,
-        scenes,
+    let Some(done) = run_sequence(args, &config, &source.sequences[0], &out, &stop, true)? else {
+        return complete_before(args, &out);
     };
-    folder.write_json("summary.json", &index)?;
-    folder.write_index(&terminal::command_line(), &index)?;
+    print_result(args, &done.summary, &out)?;
+    answered(&source.path, &done)?;
+    Ok(ending(done.summary.complete))
+}
+
+/// Say that nothing is left to do; with `--json` by the summary that is there.
+pub fn complete_before(args: &RunArgs, out: &Path) -> Result<Ending> {
+    let mut stdout = terminal::stdout();
     if args.json {
-        writeln!(terminal::stdout(), "{}", serde_json::to_string_pretty(&index)?)?;
+        let summary = out.join("summary.json");
+        stdout.write_all(&std::fs::read(&summary).with_context(|| summary.display().to_string())?)?;
+    } else {
+        writeln!(stdout, "{}: the run is complete, nothing is left to do", out.display())?;
     }
-    if complete && !index.scenes.iter().any(|scene| has_answers(&scene.counts)) {
-        bail!("{}: no scene gave a motion; see the status in each motion.csv", args.source.display());
-    }
-    Ok(ending(complete))
+    Ok(Ending::Done)
 }
 
 fn ending(complete: bool) -> Ending {
@@ -130,7 +108,7 @@ fn default_out(source: &Path) -> PathBuf {
 }
 
 /// Whether any row gives a motion, or part of one.
-fn has_answers(counts: &BTreeMap<&'static str, usize>) -> bool {
+fn has_answers(counts: &BTreeMap<Word, usize>) -> bool {
     counts.contains_key("ok") || counts.contains_key("partial")
 }
 

@@ -9,12 +9,13 @@ use egomotion::pipeline::{Config, Observe, Unanswered};
 use egomotion_io::source::{FrameFiles, Sequence};
 use egomotion_io::{image, tracks};
 
+use super::resume::{self, Settings};
 use crate::args::{RunArgs, SensorArg};
 use crate::judge::{self, MapVerdict};
 use crate::report::Eyes;
 use crate::results::{About, ResultFolder};
-use crate::session::{Session, progress};
-use crate::summary::Summary;
+use crate::session::{Outcome, Row, Session, progress};
+use crate::summary::{Cameras, Summary};
 use crate::{Usage, feed, terminal};
 
 /// A finished sequence.
@@ -23,28 +24,22 @@ pub struct DoneSequence {
     pub first_failure: Option<String>,
 }
 
-/// Run one sequence into a folder.
+/// Run one sequence into a folder; if it stands `alone`, so that it can be resumed. `None` where it was complete
+/// before.
 pub fn run_sequence(
     args: &RunArgs,
     config: &Config,
     sequence: &Sequence,
     out: &Path,
     stop: &AtomicBool,
-) -> Result<DoneSequence> {
+    alone: bool,
+) -> Result<Option<DoneSequence>> {
     let frames = select(args, sequence)?;
     let rig = sequence.rig.ok_or_else(|| {
         anyhow!("{}: no calibration; give one with --calibration FILE", args.source.display())
     })?;
     let tracks = args.tracks.as_deref().or(sequence.tracks.as_deref()).map(tracks::read).transpose()?;
-    // Tracks are sparse, whatever was asked for.
-    let config = &match &tracks {
-        Some(_) => Config { observe: Observe::Sparse, ..config.clone() },
-        None => config.clone(),
-    };
-    config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
-    if tracks.is_some() && (args.map_files().any() || args.disparity.is_some() || args.flow.is_some()) {
-        return Err(Usage("--maps, --disparity and --flow need images, not tracks".into()).into());
-    }
+    let config = &suited(args, config, tracks.is_some())?;
     check_sensor(args, sequence)?;
     let reader = feed::Reader {
         disparity: args.disparity.as_deref(),
@@ -55,23 +50,32 @@ pub fn run_sequence(
     let mask = args.mask.as_deref().map(|path| read_mask(path, &rig)).transpose()?;
     let mask = joined(mask, reader.unseen());
     let folder = ResultFolder::create(out)?;
+    let cameras = Cameras::of(sequence);
+    let settings =
+        Settings { options: args, config, rig: Some(&rig), cameras: cameras.clone(), frames: frames.len() };
+    let mut log = None;
+    if alone {
+        log = resume::log(out, &settings.head()?, args.resume, &frames, &reader)?;
+        if log.is_none() {
+            return Ok(None);
+        }
+    }
     let maps = args.map_files();
     maps.folders(out)?;
+    if args.resume {
+        folder.sweep()?;
+        maps.sweep(out)?;
+    }
     let bar = progress(frames.len(), args.quiet);
     bar.set_message(sequence.name.clone());
     let session =
         Session { rig, config, frames: frames.len(), mask, tracks: tracks.is_some(), progress: bar };
     let mut truth_maps: Option<MapVerdict> = None;
-    let mut first_failure = None;
     let outcome = session.run(
+        log,
         stop,
         |k| frames.get(k).map(|&(files, time_s)| reader.read(files, time_s, k + 1 == frames.len())),
         |row| {
-            if let Err(why) = &row.motion.motion
-                && *why != Unanswered::First
-            {
-                first_failure.get_or_insert_with(|| why.to_string());
-            }
             let (Some(dense), Some(index)) = (&row.motion.dense, row.reference_index) else { return Ok(()) };
             if let Some(truth) = sequence.truth_maps.as_ref().filter(|t| t.index == index && !args.reverse) {
                 truth_maps = judge::scene_maps(&rig, dense, truth)?;
@@ -79,28 +83,67 @@ pub fn run_sequence(
             maps.write(out, index, dense, &rig)
         },
     )?;
-    folder.write_motion(config, &outcome)?;
     let mut summary = Summary::new(args.source.display().to_string(), rig, config, &outcome);
     summary.truth_maps = truth_maps;
-    for warning in &summary.warnings {
-        terminal::tell(format_args!("{}: warning: {warning}", sequence.name));
-    }
-    folder.write_json("summary.json", &summary)?;
-    let about = About {
-        title: &format!("How the camera moved: {}", sequence.name),
-        source: &summary.source,
-        command: terminal::command_line(),
-        config,
-        rig: &rig,
-        eyes: match (&tracks, uses_depth(args, sequence)) {
-            (Some(_), _) => Eyes::Tracks,
-            (None, true) => Eyes::Depth,
-            (None, false) => Eyes::Stereo,
-        },
-        notes: notes(&summary),
+    (summary.options, summary.cameras) = (Some(serde_json::to_value(args)?), cameras);
+    let eyes = match (&tracks, uses_depth(args, sequence)) {
+        (Some(_), _) => Eyes::Tracks,
+        (None, true) => Eyes::Depth,
+        (None, false) => Eyes::Stereo,
     };
-    folder.write_report(&about, &outcome)?;
-    Ok(DoneSequence { summary, first_failure })
+    write_results(&folder, &sequence.name, eyes, &summary, &outcome)?;
+    let first_failure = first_failure(&outcome.rows);
+    match outcome.log {
+        Some(log) if outcome.complete => log.remove()?,
+        Some(_) => terminal::tell(format_args!(
+            "stopped after {} of {} frames; the same command with --resume goes on",
+            summary.frames,
+            frames.len()
+        )),
+        None => {}
+    }
+    Ok(Some(DoneSequence { summary, first_failure }))
+}
+
+/// Tracks are sparse, whatever was asked for.
+fn suited(args: &RunArgs, config: &Config, tracks: bool) -> Result<Config> {
+    let observe = if tracks { Observe::Sparse } else { config.observe };
+    let config = Config { observe, ..config.clone() };
+    config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
+    if tracks && (args.map_files().any() || args.disparity.is_some() || args.flow.is_some()) {
+        return Err(Usage("--maps, --disparity and --flow need images, not tracks".into()).into());
+    }
+    Ok(config)
+}
+
+fn write_results(
+    folder: &ResultFolder,
+    name: &str,
+    eyes: Eyes,
+    summary: &Summary,
+    outcome: &Outcome,
+) -> Result<()> {
+    folder.write_motion(&summary.config, outcome)?;
+    for warning in &summary.warnings {
+        terminal::tell(format_args!("{name}: warning: {warning}"));
+    }
+    folder.write_json("summary.json", summary)?;
+    let about = About {
+        title: &format!("How the camera moved: {name}"),
+        source: &summary.source,
+        command: terminal::command_line().replace(" --resume", ""),
+        config: &summary.config,
+        rig: &summary.rig,
+        eyes,
+        notes: notes(summary),
+    };
+    folder.write_report(&about, outcome)
+}
+
+/// Why the first frame without an answer has none.
+fn first_failure(rows: &[Row]) -> Option<String> {
+    let failures = rows.iter().filter_map(|row| row.motion.motion.as_ref().err());
+    failures.filter(|why| **why != Unanswered::First).map(ToString::to_string).next()
 }
 
 /// The sensor that is asked for must be there.

@@ -26,6 +26,11 @@ const NAME: (&str, &str) = ("standard input", "egomotion-out/stdin");
 
 /// Run the frames that are piped in.
 pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
+    if args.resume {
+        return Err(
+            Usage("frames on standard input cannot be had again: --resume needs a recording".into()).into()
+        );
+    }
     let Some(file) = &args.calibration else {
         return Err(Usage("frames on standard input need --calibration FILE".into()).into());
     };
@@ -44,7 +49,7 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
     // Progress would stand between the lines of whoever looks at both.
     let session =
         Session { rig: pair.rig, config, frames: 0, mask: None, tracks: false, progress: progress(0, true) };
-    let stop = stop_signal();
+    let stop = stop_signal("frame");
     let source = Mutex::new((Some(first), pairs));
     let fetch = |k: usize| {
         let (first, pairs) = &mut *source.lock().ok()?;
@@ -67,9 +72,10 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
             frame: frame.map(|frame| Given::Frame(Box::new(frame))),
             truth: None,
             decode_ms: 0.0,
+            bytes: 0,
         })
     };
-    let outcome = session.run(&stop, fetch, |row| {
+    let outcome = session.run(None, &stop, fetch, |row| {
         let mut stdout = terminal::stdout();
         writeln!(stdout, "{}", line(row))?;
         stdout.flush()?;

@@ -11,10 +11,10 @@ use anyhow::{Context, Result, anyhow};
 use egomotion::study::Study;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::journal::{Head, Journal, Parts};
 use super::page::{self, Chapter};
 use super::{figure, table};
 use crate::chart::number::count;
+use crate::journal::{Head, Journal, Parts};
 use crate::results::ResultFolder;
 use crate::{Ending, terminal};
 
@@ -91,7 +91,7 @@ impl Laboratory {
             match study.run(k) {
                 Ok(records) => {
                     // As they are read back, so that a resumed study differs in nothing.
-                    found.records.extend(journal.add(part, &records)?);
+                    found.records.extend(journal.exchange(part, &records)?);
                     found.done += 1;
                     bar.inc(1);
                 }
@@ -107,7 +107,7 @@ impl Laboratory {
     fn journal<S: Study>(&self, study: &S, parts: &[String]) -> Result<(Journal, Parts<S::Record>)> {
         let path = self.folder.path().join(format!("{}.parts.jsonl", study.name()));
         let settings = serde_json::to_value(study).context("the settings cannot be put into JSON")?;
-        let head = Head { version: env!("CARGO_PKG_VERSION").into(), study: study.name().into(), settings };
+        let head = Head::new(format!("study {}", study.name()), settings);
         if !self.options.resume {
             return Ok((Journal::begin(&path, &head)?, Parts::new()));
         }

@@ -2,16 +2,12 @@
 
 mod args;
 mod figure;
-mod journal;
 mod laboratory;
 mod page;
 mod real;
 mod table;
 #[cfg(test)]
 mod tests;
-
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Result;
 use egomotion::pipeline::Observe;
@@ -24,6 +20,7 @@ use egomotion::study::sensitivity::{OneSetting, Sensitivity};
 use egomotion::study::uncertainty::Uncertainty;
 
 use crate::run::set_threads;
+use crate::session::stop_signal;
 use crate::{Ending, terminal};
 
 pub use args::StudyCommand;
@@ -120,20 +117,5 @@ fn open(args: &LaboratoryArgs, study: Option<&str>, title: Option<&str>) -> Resu
         title: title.map(str::to_owned),
         command: terminal::command_line().replace(" --resume", ""),
     };
-    Laboratory::open(&args.folder(study), options, stop_signal())
-}
-
-/// Set when the user asks to stop; a second time ends the program at once, and what is done is kept.
-fn stop_signal() -> Arc<AtomicBool> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    let handler = move || {
-        if asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        terminal::tell("stopping after this part; a second Ctrl-C stops at once");
-    };
-    // Only a second laboratory of a process finds a handler there already.
-    let _ = ctrlc::set_handler(handler);
-    stop
+    Laboratory::open(&args.folder(study), options, stop_signal("part"))
 }

@@ -1,6 +1,7 @@
 //! From constraints to φ with its covariance.
 
 pub mod alignment;
+mod array;
 pub mod blocks;
 pub mod errors_in_variables;
 pub mod least_squares;
@@ -19,6 +20,7 @@ pub mod two_step;
 pub mod undetermined;
 
 use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::geometry::{Gaussian, Twist};
@@ -29,11 +31,12 @@ pub use row::{NormalEquations, Row};
 pub use undetermined::{FreeMotion, Undetermined};
 
 /// The answer of an estimator of N unknowns.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate<const N: usize> {
     /// θ̂ and its covariance; an unobserved component has value 0 and an infinite variance.
     pub theta: Gaussian<N>,
     /// Which components are determined by the data.
+    #[serde(with = "array")]
     pub observed: [bool; N],
     /// The directions that are not; for φ, what they are in words.
     pub undetermined: Undetermined<N>,
@@ -89,7 +92,7 @@ impl MotionEstimate {
 }
 
 /// Why a system of equations has no answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error, Serialize, Deserialize)]
 pub enum Unsolvable {
     /// Fewer equations than unknowns.
     #[error("{rows} equations for {needed} unknowns")]

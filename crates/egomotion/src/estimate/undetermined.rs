@@ -3,12 +3,15 @@
 use std::fmt;
 
 use nalgebra::{DMatrix, Matrix6, SVector, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
+use super::array;
 use crate::geometry::Twist;
 
 /// The directions of N unknowns that the data do not determine: a basis of what may be added to θ unseen.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Undetermined<const N: usize> {
+    #[serde(with = "array")]
     directions: [SVector<f64, N>; N],
     count: usize,
     /// How sharply the directions are known, as a share of their length.

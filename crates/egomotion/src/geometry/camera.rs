@@ -36,7 +36,7 @@ pub enum Distortion {
 }
 
 /// A pinhole camera with a lens; pixel centres lie at integers.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Camera {
     focal_px: Vector2<f64>,
     centre_px: Vector2<f64>,

@@ -1,9 +1,10 @@
 //! A mean with its covariance, and propagation through a Jacobian, equation (30).
 
 use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
 
 /// A Gaussian of N quantities.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Gaussian<const N: usize> {
     /// Mean.
     pub mean: SVector<f64, N>,

@@ -5,6 +5,7 @@
 //! toolbox). Every point then lies on one row of both images.
 
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
+use serde::Serialize;
 use thiserror::Error;
 
 use super::camera::Camera;
@@ -12,7 +13,7 @@ use super::rig::{RigError, StereoRig};
 use super::twist::{RigidMotion, Twist};
 
 /// A pair of cameras and the rectified rig that their images are turned into.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StereoRectification {
     left: Camera,
     right: Camera,

@@ -4,9 +4,10 @@
 //! The camera's own motion is the inverse; [`RigidMotion::inverse`] is the one place to turn it.
 
 use nalgebra::{Matrix3, Matrix6, Rotation3, SMatrix, UnitQuaternion, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 /// Six parameters of rigid scene motion over one frame interval (or per second where a name says so).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Twist {
     /// Translational velocity t, in metres per interval.
     pub t: Vector3<f64>,
@@ -15,7 +16,7 @@ pub struct Twist {
 }
 
 /// A finite rigid motion P′ = R P + T, equation (5).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RigidMotion {
     /// Rotation R.
     pub rotation: Matrix3<f64>,

@@ -10,7 +10,7 @@ use crate::geometry::Gaussian;
 pub const Z95: f64 = 1.959_963_984_540_054;
 
 /// Time to impact, counted from the later frame, held as looming because that stays near-Gaussian through VZ = 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TimeToImpact {
     /// Looming in 1/s; positive approaches.
     pub looming: Gaussian<1>,

@@ -1,12 +1,13 @@
 //! The nearest obstacle: of all that will pass through the vehicle's window, the connected region met first.
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::TimeToImpact;
 use crate::geometry::{Cells, PixelBounds, upper_median};
 
 /// What will be met first if nothing changes its motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Obstacle {
     /// When the first tenth of the region has been met.
     pub impact: TimeToImpact,
@@ -17,7 +18,7 @@ pub struct Obstacle {
 }
 
 /// Why there is no obstacle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error, Serialize, Deserialize)]
 pub enum NoObstacle {
     /// No point has a distance and a motion.
     #[error("nothing was measured")]

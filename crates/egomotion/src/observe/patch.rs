@@ -4,6 +4,7 @@
 //! Both windows are reduced to zero mean and equal contrast, so that gain and offset between cameras or exposures do not matter.
 
 use nalgebra::{Matrix2, Vector2};
+use serde::{Deserialize, Serialize};
 
 use super::dispatch::vectorised;
 use super::window::{self, LANES, SIDE, Window};
@@ -49,7 +50,7 @@ pub struct Patch {
 ///
 /// Smoothing makes neighbours move together: noise that has become weak still moves a place as
 /// far. With g the derivatives and K the smoothing, Σ (K g)(K g)ᵀ takes the place of Σ g gᵀ.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Localisation {
     /// Covariance of (u, v), free in the plane.
     pub plane: Matrix2<f64>,

@@ -82,7 +82,7 @@ pub enum Expected {
 }
 
 /// A corner of a frame, located in both its images.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StereoCorner {
     /// Column in the left image, in pixels.
     pub u: f64,
@@ -99,7 +99,7 @@ pub struct StereoCorner {
 }
 
 /// How the disparity of a corner was found.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) enum Across {
     /// In the right image.
     Matched {

@@ -3,8 +3,10 @@
 use std::collections::HashMap;
 
 use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::config::{Config, ConfigError, Method, Observe};
+use super::memory::TrackMemory;
 use super::stereo::{FrameMotion, MOST_FAILURES, PipelineError, StageTimes};
 use super::track_solver::TrackSolver;
 use super::unanswered::Unanswered;
@@ -13,7 +15,7 @@ use crate::geometry::{Gaussian, StereoRig, Twist};
 use crate::observe::StereoTrack;
 
 /// A point of a track: where one frame's two images show it, in pixels.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TrackPoint {
     /// The same number for the same point in every frame.
     pub track: u64,
@@ -70,6 +72,30 @@ impl TrackMotion {
     /// The frame that the next one will be compared with.
     pub fn reference(&self) -> Option<usize> {
         self.reference.as_ref().map(|reference| reference.frame)
+    }
+
+    /// What is kept of the frames so far: with it [`TrackMotion::recall`] goes on.
+    pub fn memory(&self) -> TrackMemory {
+        let kept = |r: &Reference| (r.frame, r.time_s, r.points.values().copied().collect());
+        TrackMemory {
+            frames: self.frames,
+            last_time_s: self.last_time_s,
+            reference: self.reference.as_ref().map(kept),
+            velocity: self.velocity,
+            failures: self.failures,
+        }
+    }
+
+    /// Go on where a pipeline of the same rig and choices had this memory: every later answer is the same.
+    pub fn recall(&mut self, memory: TrackMemory) {
+        let TrackMemory { frames, last_time_s, reference, velocity, failures } = memory;
+        let again = |(frame, time_s, points): (usize, f64, Vec<TrackPoint>)| {
+            let points = points.into_iter().map(|point| (point.track, point)).collect();
+            Reference { frame, time_s, points }
+        };
+        self.reference = reference.map(again);
+        (self.frames, self.last_time_s) = (frames, last_time_s);
+        (self.velocity, self.failures) = (velocity, failures);
     }
 
     /// Account for a frame that could not be read.

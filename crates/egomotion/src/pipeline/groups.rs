@@ -4,6 +4,7 @@ use std::cmp::Reverse;
 
 use nalgebra::{Vector3, Vector6};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::config::Config;
 use super::moving::Moving;
@@ -33,7 +34,7 @@ const ALIKE: f64 = 22.46;
 const MEDIAN_CHI2: f64 = 0.454_94;
 
 /// Something that moves by itself, between two frames.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MovingGroup {
     /// Pixels of the earlier left image that it covers.
     pub pixels: usize,

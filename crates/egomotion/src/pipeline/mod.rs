@@ -8,6 +8,7 @@ pub mod given_tracks;
 pub mod groups;
 mod map_row;
 pub mod maps;
+pub mod memory;
 mod moving;
 pub mod rgbd;
 mod shape;
@@ -21,6 +22,7 @@ pub use config::{Approach, Config, ConfigError, EstimatorKind, Method, Observe, 
 pub use frame::{Frame, StereoFrame};
 pub use given_tracks::{TrackMotion, TrackPoint};
 pub use groups::MovingGroup;
+pub use memory::{StereoMemory, TrackMemory};
 pub use rgbd::{DepthCamera, DepthNoise, RgbdMotion};
 pub use stereo::{FrameMotion, StereoMotion};
 pub use trajectory::Trajectory;

@@ -1,5 +1,6 @@
 //! Frames in, motion out: keeps what one frame needs of the ones before.
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::config::{Config, ConfigError, Observe};
@@ -7,6 +8,7 @@ use super::frame::{Frame, erase};
 use super::frame_pair::{FramePair, Reference, timed};
 use super::groups::MovingGroup;
 use super::maps::MotionMaps;
+use super::memory::{KeptFrame, StereoMemory};
 use super::unanswered::Unanswered;
 use crate::estimate::MotionEstimate;
 use crate::geometry::{Grid, RigError, StereoRig, Twist};
@@ -15,7 +17,7 @@ use crate::observe::flow::FlowSpace;
 use crate::observe::{DisparityMap, DisparityMatcher, FlowField, StereoPyramid};
 
 /// Milliseconds spent in each stage of one frame.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageTimes {
     /// Pyramids and gradients.
     pub pyramids_ms: f64,
@@ -43,7 +45,7 @@ pub struct DenseResults {
 }
 
 /// What one frame says about motion since its reference frame.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FrameMotion {
     /// This frame's index, counted over all frames pushed or skipped.
     pub frame: usize,
@@ -62,7 +64,8 @@ pub struct FrameMotion {
     pub obstacle: Result<Obstacle, NoObstacle>,
     /// What moves by itself, the largest group first; found when observing densely.
     pub moving: Vec<MovingGroup>,
-    /// The maps, when observing densely.
+    /// The maps, when observing densely; not kept where this is written to a file.
+    #[serde(skip)]
     pub dense: Option<DenseResults>,
     /// Where the time went.
     pub stages: StageTimes,
@@ -184,20 +187,7 @@ impl StereoMotion {
         }
         self.last_time_s = Some(frame.time_s);
         let mut stages = StageTimes::default();
-        let images = timed(&mut stages.pyramids_ms, || {
-            let mut images = self.spare.take().unwrap_or_default();
-            images.renew(&frame.left, frame.right.as_ref(), self.config.tracks.pyramid_levels);
-            images
-        });
-        let matched = timed(&mut stages.disparity_ms, || self.disparity(frame.disparity, &images));
-        let here = Reference {
-            frame: self.frames,
-            time_s: frame.time_s,
-            images,
-            disparity: matched,
-            flow: frame.flow,
-            corners: Vec::new(),
-        };
+        let here = self.prepared(frame, &mut stages);
         let Some(mut before) = self.reference.take() else {
             let first = self.skip(here.time_s, Unanswered::First);
             self.reference = Some(here);
@@ -233,6 +223,52 @@ impl StereoMotion {
         };
         self.remember(&answer, before, Reference { corners: result.corners, ..here });
         answer
+    }
+
+    /// What is kept of the frames so far: with it, and the frame that it names, [`StereoMotion::recall`] goes on.
+    pub fn memory(&self) -> StereoMemory {
+        let kept = |r: &Reference| KeptFrame { frame: r.frame, time_s: r.time_s, corners: r.corners.clone() };
+        StereoMemory {
+            frames: self.frames,
+            last_time_s: self.last_time_s,
+            reference: self.reference.as_ref().map(kept),
+            velocity: self.velocity,
+            failures: self.failures,
+        }
+    }
+
+    /// Go on where a pipeline of the same rig, choices and mask had this memory: every later answer is the same,
+    /// bit for bit. `frame` gives again the one with the index that [`StereoMemory::reference`] names.
+    ///
+    /// # Errors
+    /// Why that frame cannot be used; the pipeline then stays as it was.
+    pub fn recall(
+        &mut self,
+        memory: StereoMemory,
+        frame: impl FnOnce(usize) -> Result<Frame, Unanswered>,
+    ) -> Result<(), Unanswered> {
+        let reference = memory.reference.map(|kept| -> Result<Reference, Unanswered> {
+            let frame = frame(kept.frame)?;
+            frame.check(&self.rig)?;
+            let images = self.prepared(frame, &mut StageTimes::default());
+            Ok(Reference { frame: kept.frame, time_s: kept.time_s, corners: kept.corners, ..images })
+        });
+        self.reference = reference.transpose()?;
+        (self.frames, self.last_time_s) = (memory.frames, memory.last_time_s);
+        (self.velocity, self.failures) = (memory.velocity, memory.failures);
+        Ok(())
+    }
+
+    /// A frame with all that is computed of it alone.
+    fn prepared(&mut self, frame: Frame, stages: &mut StageTimes) -> Reference {
+        let images = timed(&mut stages.pyramids_ms, || {
+            let mut images = self.spare.take().unwrap_or_default();
+            images.renew(&frame.left, frame.right.as_ref(), self.config.tracks.pyramid_levels);
+            images
+        });
+        let disparity = timed(&mut stages.disparity_ms, || self.disparity(frame.disparity, &images));
+        let (frames, time_s) = (self.frames, frame.time_s);
+        Reference { frame: frames, time_s, images, disparity, flow: frame.flow, corners: Vec::new() }
     }
 
     /// The given disparity, or that of the images when observing densely, without what is masked.

@@ -1,11 +1,12 @@
 //! Why there is no answer for a frame.
 
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::estimate::Unsolvable;
 
 /// Why there is no answer for a frame.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Eq, Error, Serialize, Deserialize)]
 pub enum Unanswered {
     /// There is no earlier frame to compare with.
     #[error("no earlier frame")]

@@ -1,4 +1,4 @@
-//! The parts of a study that are done, kept on the disk so that a stopped study can go on.
+//! The parts of a study or a run that are done, kept on the disk so that what was stopped can go on.
 //!
 //! One JSON object a line: first what was begun, then each part as it is done, flushed before the next begins.
 //! The records of a part are a string in RON, whose numbers may be NaN or infinite and come back as they were.
@@ -19,10 +19,40 @@ use serde_json::Value;
 pub struct Head {
     /// Version of this program.
     pub version: String,
-    /// Name of the study.
-    pub study: String,
-    /// Its settings.
+    /// What it was to do: a run, or a study by its name.
+    pub work: String,
+    /// All that the results depend on.
     pub settings: Value,
+}
+
+impl Head {
+    /// Work of this program.
+    pub fn new(work: impl Into<String>, settings: Value) -> Self {
+        Self { version: env!("CARGO_PKG_VERSION").into(), work: work.into(), settings }
+    }
+
+    /// Refuse what was begun otherwise; `path` is where that is told.
+    pub fn check(&self, begun: &Self, path: &Path) -> Result<()> {
+        if (&begun.work, &begun.version) != (&self.work, &self.version) {
+            bail!(
+                "{}: was begun as {} of egomotion {}, this is {} of {}; {ANEW}",
+                path.display(),
+                begun.work,
+                begun.version,
+                self.work,
+                self.version
+            );
+        }
+        let differences = differences(&begun.settings, &self.settings);
+        if !differences.is_empty() {
+            bail!(
+                "{}: was begun with other settings: {}; give the same settings, or {ANEW}",
+                path.display(),
+                differences.join(", ")
+            );
+        }
+        Ok(())
+    }
 }
 
 /// One part that is done.
@@ -63,7 +93,10 @@ impl Journal {
         let Some((first, rest)) = lines.split_first() else {
             return Ok((Self::begin(path, head)?, Parts::new()));
         };
-        check(path, first, head)?;
+        let Ok(begun) = serde_json::from_slice(first) else {
+            return Err(IoError::new(path, "does not tell what was begun", ANEW).at_line(1).into());
+        };
+        head.check(&begun, path)?;
         let (mut parts, mut kept) = (Parts::new(), first.len());
         for (k, line) in rest.iter().enumerate() {
             match part(line) {
@@ -85,14 +118,23 @@ impl Journal {
         Ok((Self { path: path.to_owned(), file }, parts))
     }
 
-    /// Add a part, and give its records back as they will be read when the study is resumed.
-    pub fn add<R: Serialize + DeserializeOwned>(&mut self, name: &str, records: &[R]) -> Result<Vec<R>> {
-        let records =
-            ron::to_string(records).with_context(|| format!("the records of {name} cannot be kept"))?;
+    /// Add a part.
+    pub fn add<R: Serialize>(&mut self, name: &str, records: &[R]) -> Result<()> {
+        self.line(&Done { part: name.to_owned(), records: in_ron(name, records)? })
+    }
+
+    /// Add a part, and give its records back as they will be read when the work is resumed.
+    pub fn exchange<R: Serialize + DeserializeOwned>(&mut self, name: &str, records: &[R]) -> Result<Vec<R>> {
+        let records = in_ron(name, records)?;
         let again =
             ron::from_str(&records).with_context(|| format!("the records of {name} cannot be read back"))?;
         self.line(&Done { part: name.to_owned(), records })?;
         Ok(again)
+    }
+
+    /// All is done: nothing is left to go on with.
+    pub fn remove(self) -> Result<()> {
+        Ok(fs::remove_file(&self.path).map_err(|e| IoError::system(&self.path, "remove", &e))?)
     }
 
     fn line(&mut self, value: &impl Serialize) -> Result<()> {
@@ -103,37 +145,16 @@ impl Journal {
     }
 }
 
-const ANEW: &str = "run without --resume to start anew";
+/// What to do where nothing can be gone on with.
+pub const ANEW: &str = "run without --resume to start anew";
+
+fn in_ron<R: Serialize>(name: &str, records: &[R]) -> Result<String> {
+    ron::to_string(records).with_context(|| format!("the records of {name} cannot be kept"))
+}
 
 fn part<R: DeserializeOwned>(line: &[u8]) -> Result<(String, Vec<R>)> {
     let done: Done = serde_json::from_slice(line)?;
     Ok((done.part, ron::from_str(&done.records)?))
-}
-
-/// Refuse what was begun otherwise.
-fn check(path: &Path, line: &[u8], head: &Head) -> Result<()> {
-    let Ok(found) = serde_json::from_slice::<Head>(line) else {
-        return Err(IoError::new(path, "does not tell what was begun", ANEW).at_line(1).into());
-    };
-    if found.study != head.study || found.version != head.version {
-        bail!(
-            "{}: was begun by the study {} of egomotion {}, this is {} of {}; {ANEW}",
-            path.display(),
-            found.study,
-            found.version,
-            head.study,
-            head.version
-        );
-    }
-    let differences = differences(&found.settings, &head.settings);
-    if !differences.is_empty() {
-        bail!(
-            "{}: was begun with other settings: {}; give the same settings, or {ANEW}",
-            path.display(),
-            differences.join(", ")
-        );
-    }
-    Ok(())
 }
 
 /// Each setting that differs, as `step was 1 and is 2`.
@@ -198,7 +219,7 @@ mod tests {
     fn every_number_comes_back_as_it_was() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.parts.jsonl");
-        let head = Head { version: "1".into(), study: "a".into(), settings: json!({"seed": 1}) };
+        let head = Head::new("a", json!({"seed": 1}));
         // Patterns of bits from a linear congruential generator: every exponent, both signs.
         let mut state = 2003_u64;
         let mut next = || {
@@ -229,7 +250,7 @@ mod tests {
         let records =
             [record(None), record(Some(f64::NAN)), Record { kind: Kind::Plain, ..record(Some(2.0)) }];
         let mut journal = Journal::begin(&path, &head).unwrap();
-        let taken = journal.add("one", &records).unwrap();
+        let taken = journal.exchange("one", &records).unwrap();
         let (_, parts) = Journal::resume::<Record>(&path, &head).unwrap();
         for found in [&taken, &parts["one"]] {
             assert_eq!(
