@@ -3,6 +3,7 @@
 use std::fmt::Display;
 
 use egomotion::estimate;
+use egomotion_io::ChoiceError;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
@@ -23,4 +24,12 @@ pub fn unsolvable(error: estimate::Unsolvable) -> PyErr {
 /// A value that has no meaning.
 pub fn value(error: impl Display) -> PyErr {
     PyValueError::new_err(error.to_string())
+}
+
+/// A choice that has no meaning is a wrong value.
+pub fn choice(error: ChoiceError) -> PyErr {
+    match error {
+        ChoiceError::Choice(words) => value(words),
+        ChoiceError::File(error) => read(error),
+    }
 }

@@ -16,6 +16,7 @@ mod observe;
 mod pipeline;
 mod rig;
 mod rows;
+mod simulate;
 mod study;
 mod world;
 
@@ -54,6 +55,8 @@ mod _native {
     use crate::rig::Rig;
     #[pymodule_export]
     use crate::rows::Rows;
+    #[pymodule_export]
+    use crate::simulate::simulate;
     #[pymodule_export]
     use crate::study::Study;
     #[pymodule_export]

@@ -22,11 +22,11 @@ mod simulate;
 mod study;
 mod summary;
 mod terminal;
-mod toml_file;
 
 use std::process::ExitCode;
 
 use clap::Parser;
+use egomotion_io::ChoiceError;
 
 use args::{Cli, Command};
 
@@ -49,6 +49,14 @@ impl std::fmt::Display for Usage {
 }
 
 impl std::error::Error for Usage {}
+
+/// A choice that has no meaning is one of options.
+pub fn refusal(error: ChoiceError) -> anyhow::Error {
+    match error {
+        ChoiceError::Choice(words) => Usage(words).into(),
+        ChoiceError::File(error) => error.into(),
+    }
+}
 
 fn main() -> ExitCode {
     memory::keep();

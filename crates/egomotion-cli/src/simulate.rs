@@ -1,26 +1,24 @@
 //! `egomotion simulate`: a rendered sequence on disk, in KITTI layout, with its exact truth beside it.
 
-mod folder;
-mod world;
-
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use anyhow::Result;
+use egomotion_io::simulated::{SequenceFolder, World};
 
 use crate::args::SimulateArgs;
 use crate::run::set_threads;
 use crate::session::{progress, stop_signal};
-use crate::{Ending, terminal};
-use folder::SequenceFolder;
-use world::World;
-pub use world::check_size;
+use crate::{Ending, refusal, terminal};
 
 /// Render frame by frame and write.
 pub fn simulate(args: &SimulateArgs) -> Result<Ending> {
     set_threads(args.threads)?;
-    let world = World::of(args)?;
+    let world = World::of(&args.options()).map_err(refusal)?;
+    for warning in &world.warnings {
+        terminal::tell(warning);
+    }
     let name = &world.sequence.name;
     let out: PathBuf = args.out.clone().unwrap_or_else(|| Path::new("egomotion-out").join(name));
     let folder = SequenceFolder::create(&out, world.frames)?;

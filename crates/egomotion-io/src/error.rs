@@ -53,6 +53,17 @@ impl IoError {
     }
 }
 
+/// Why something that was asked for cannot be done.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum ChoiceError {
+    /// The choices have no meaning, or do not fit together or to what they are about.
+    #[error("{0}")]
+    Choice(String),
+    /// A file that is needed cannot be used.
+    #[error(transparent)]
+    File(#[from] IoError),
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

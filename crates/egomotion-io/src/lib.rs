@@ -32,6 +32,7 @@ pub mod pfm;
 pub mod ply;
 mod raster;
 pub mod read;
+pub mod simulated;
 pub mod source;
 pub mod stream;
 pub mod tracks;
@@ -39,7 +40,7 @@ pub mod trajectory;
 pub mod undistort;
 pub mod write;
 
-pub use error::IoError;
+pub use error::{ChoiceError, IoError};
 pub use source::Source;
 
 /// The examples of the README, compiled with the doc tests; here because they need both libraries.

@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
+
 use crate::IoError;
 
 /// The most pixels that a decoded image or map may have, 2²⁸.
@@ -31,6 +33,22 @@ pub fn text(path: &Path) -> Result<String, IoError> {
     let not_text =
         |_| IoError::new(path, "is not a text file", "check that the name belongs to this kind of file");
     String::from_utf8(bounded(path, MAX_TEXT)?).map_err(not_text)
+}
+
+/// The value that a TOML file holds.
+///
+/// # Errors
+/// The file cannot be read, or does not hold such a value; the error names the line.
+pub fn toml<T: DeserializeOwned>(path: &Path) -> Result<T, IoError> {
+    let text = text(path)?;
+    ::toml::from_str(&text).map_err(|e| {
+        let breaks = |end: usize| text.bytes().take(end).filter(|&b| b == b'\n').count();
+        let error = IoError::new(path, e.message().replace('\n', " "), "correct the file");
+        match e.span() {
+            Some(span) => error.at_line(breaks(span.start) + 1),
+            None => error,
+        }
+    })
 }
 
 fn bounded(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {

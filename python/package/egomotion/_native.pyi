@@ -442,6 +442,18 @@ def maximum_likelihood(
 def robust_scale(median_square: float, n: int, p: int) -> float: ...
 def rotation_and_u(phi: npt.ArrayLike, dt: float = 1.0) -> tuple[_F64, _F64]: ...
 def seen_from(phi: npt.ArrayLike, centre: npt.ArrayLike) -> _F64: ...
+def simulate(
+    name: str,
+    out: _Path,
+    *,
+    step: float = 1.0,
+    frames: int | None = None,
+    size: tuple[int, int] | None = None,
+    noise: bool | None = None,
+    seed: int | None = None,
+    texture: int | None = None,
+    scene: _Path | None = None,
+) -> int: ...
 def smallest_change(d: npt.ArrayLike, step: float, rig: StereoRig) -> _F64: ...
 def track(
     before: tuple[npt.ArrayLike, npt.ArrayLike],

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::simulate::check_size;
 use crate::study::StudyCommand;
+use egomotion_io::simulated::{self, check_size};
 
 pub use evaluate::EvaluateArgs;
 pub use run::{ApproachArg, CloudArg, EstimatorArg, MapFormat, MethodArg, ObserveArg, RunArgs, SensorArg};
@@ -119,6 +119,22 @@ pub struct SimulateArgs {
     /// Show no progress.
     #[arg(long)]
     pub quiet: bool,
+}
+
+impl SimulateArgs {
+    /// What is asked for.
+    pub fn options(&self) -> simulated::Options {
+        simulated::Options {
+            sequence: self.sequence.clone(),
+            step: self.step,
+            frames: self.frames.map(|frames| frames as usize),
+            size_px: self.size,
+            noise: self.noise.map(|noise| matches!(noise, NoiseArg::Sensor)),
+            seed: self.seed,
+            texture: self.texture,
+            scene: self.scene.clone(),
+        }
+    }
 }
 
 /// Files are numbered with six digits.

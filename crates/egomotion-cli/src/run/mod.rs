@@ -11,12 +11,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use egomotion::pipeline::{Config, Observe};
+use egomotion_io::read;
 use egomotion_io::source::{Layout, Source};
 
 use crate::args::RunArgs;
 use crate::session::stop_signal;
 use crate::summary::{Summary, Word};
-use crate::{Ending, Usage, pairs, terminal, toml_file};
+use crate::{Ending, Usage, pairs, terminal};
 use sequence::{DoneSequence, run_sequence};
 
 /// Run a source, be it one sequence or a set of scenes.
@@ -66,7 +67,7 @@ fn ending(complete: bool) -> Ending {
 fn resolve_config(args: &RunArgs) -> Result<Config> {
     let mut config = match &args.config {
         None => Config::default(),
-        Some(path) => toml_file::read(path)?,
+        Some(path) => read::toml(path)?,
     };
     if let Some(method) = args.method {
         config.method = method.into();

@@ -94,7 +94,7 @@ fn a_file_of_settings_is_named_with_its_line() {
     assert_refused(&with_file(&[0xff, 0xfe]), 1, &["settings.toml"]);
     fs::remove_file(&file).unwrap();
     let ended = try_run(recording(), &out, &format!("--config {}", file.display()));
-    assert_refused(&ended, 1, &["settings.toml", "cannot be read"]);
+    assert_refused(&ended, 1, &["settings.toml", "cannot read"]);
     assert!(!out.exists());
 }
 

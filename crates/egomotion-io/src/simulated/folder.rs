@@ -3,15 +3,15 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
-use egomotion::geometry::{Grid, Twist};
-use egomotion_io::trajectory::{Pose, write_kitti, write_tum};
-use egomotion_io::{IoError, calibration, flo, image, pfm, write};
+use egomotion::geometry::{Grid, RigidMotion, Twist};
 use serde::Serialize;
 
-use super::world::{SceneFile, World};
+use super::{SceneFile, World};
+use crate::trajectory::{Pose, write_kitti, write_tum};
+use crate::{IoError, calibration, flo, image, pfm, write};
 
-/// A folder that a rendered sequence goes to.
+/// A folder that a rendered sequence goes to: KITTI odometry's layout, and the truth beside it.
+#[derive(Debug)]
 pub struct SequenceFolder {
     path: PathBuf,
 }
@@ -60,7 +60,10 @@ const SCENE_HEAD: &str = "\
 
 impl SequenceFolder {
     /// Make the folders, and take away what will be written anew, so that an interrupted run leaves no mixture.
-    pub fn create(path: &Path, frames: usize) -> Result<Self> {
+    ///
+    /// # Errors
+    /// The folder cannot be made, or holds frames of a longer sequence.
+    pub fn create(path: &Path, frames: usize) -> Result<Self, IoError> {
         for (name, _) in FRAMES {
             write::folder(&path.join(name))?;
         }
@@ -71,7 +74,7 @@ impl SequenceFolder {
         for file in each.chain(COURSE.map(|name| path.join(name))) {
             match std::fs::remove_file(&file) {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                    return Err(IoError::system(&file, "replace", &error).into());
+                    return Err(IoError::system(&file, "replace", &error));
                 }
                 _ => {}
             }
@@ -80,7 +83,7 @@ impl SequenceFolder {
     }
 
     /// Frames of a longer sequence would be read as if they belonged to this one.
-    fn refuse_longer(&self, frames: usize) -> Result<()> {
+    fn refuse_longer(&self, frames: usize) -> Result<(), IoError> {
         for (name, _) in FRAMES {
             let folder = self.path.join(name);
             let failed = |error| IoError::system(&folder, "list", &error);
@@ -88,10 +91,8 @@ impl SequenceFolder {
                 let file = entry.map_err(failed)?.path();
                 let number = file.file_stem().and_then(|stem| stem.to_str()?.parse::<usize>().ok());
                 if number.is_some_and(|number| number >= frames) {
-                    bail!(
-                        "{}: is not of this sequence of {frames} frames; remove the folder or choose another --out",
-                        file.display()
-                    );
+                    let reason = format!("is not of this sequence of {frames} frames");
+                    return Err(IoError::new(&file, reason, "remove the folder or choose another one"));
                 }
             }
         }
@@ -103,7 +104,10 @@ impl SequenceFolder {
     }
 
     /// `calib.txt` and `scene.toml`.
-    pub fn write_scene(&self, world: &World) -> Result<()> {
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write_scene(&self, world: &World) -> Result<(), IoError> {
         calibration::write(&self.path.join("calib.txt"), &world.sequence.rig)?;
         let scene = SceneFile {
             rig: Some(world.sequence.rig),
@@ -114,8 +118,13 @@ impl SequenceFolder {
     }
 
     /// The images and the maps of frame `k`.
-    pub fn write_frame(&self, world: &World, k: usize) -> Result<()> {
-        let (view, images) = world.sequence.view(k).zip(world.photograph(k)).context("no such frame")?;
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write_frame(&self, world: &World, k: usize) -> Result<(), IoError> {
+        let missing =
+            || IoError::new(&self.path, format_args!("there is no frame {k}"), "take a smaller number");
+        let (view, images) = world.sequence.view(k).zip(world.photograph(k)).ok_or_else(missing)?;
         // The last frame has no motion to a later one, even where the sequence would go on.
         let phi = world.sequence.phi(k).filter(|_| k + 1 < world.frames);
         let truth = view.truth_maps(phi.as_ref());
@@ -123,9 +132,8 @@ impl SequenceFolder {
         image::write_grey(&self.file("image_1", k, "png"), &images.right)?;
         pfm::write(&self.file("truth/disparity", k, "pfm"), truth.shift.grid())?;
         pfm::write(&self.file("truth/depth", k, "pfm"), truth.depth.grid())?;
-        let bits = truth.visible.values().iter().map(|&bits| f32::from(bits)).collect();
         let (width, height) = truth.visible.size();
-        let bits = Grid::from_values(width, height, bits).context("a map of another size")?;
+        let bits = Grid::from_fn(width, height, |u, v| f32::from(truth.visible.at(u, v)));
         image::write_grey(&self.file("truth/visible", k, "png"), &bits)?;
         if phi.is_some() {
             pfm::write(&self.file("truth/depth_velocity", k, "pfm"), truth.depth_velocity.grid())?;
@@ -135,9 +143,13 @@ impl SequenceFolder {
     }
 
     /// Time stamps, poses and motions of the first `frames` frames.
-    pub fn write_course(&self, world: &World, frames: usize) -> Result<()> {
+    ///
+    /// # Errors
+    /// A file cannot be written.
+    pub fn write_course(&self, world: &World, frames: usize) -> Result<(), IoError> {
         let sequence = &world.sequence;
-        let first = sequence.world_from_left(0).context("a sequence without a frame")?.inverse();
+        // Every sequence has a frame.
+        let first = sequence.world_from_left(0).unwrap_or(RigidMotion::identity()).inverse();
         let pose = |k: usize| {
             let world_from_camera = first.after(&sequence.world_from_left(k)?);
             Some(Pose { time_s: Some(k as f64 * sequence.interval_s), world_from_camera })
@@ -165,8 +177,11 @@ impl SequenceFolder {
         self.write_toml("truth/motion.toml", MOTION_HEAD, &motion)
     }
 
-    fn write_toml(&self, name: &str, head: &str, value: &impl Serialize) -> Result<()> {
-        let text = toml::to_string(value).with_context(|| format!("cannot put {name} into TOML"))?;
-        Ok(write::bytes(&self.path.join(name), format!("{head}\n{text}").as_bytes())?)
+    fn write_toml(&self, name: &str, head: &str, value: &impl Serialize) -> Result<(), IoError> {
+        let path = self.path.join(name);
+        let failed =
+            |error| IoError::new(&path, format_args!("cannot be put into TOML: {error}"), "report this");
+        let text = toml::to_string(value).map_err(failed)?;
+        write::bytes(&path, format!("{head}\n{text}").as_bytes())
     }
 }

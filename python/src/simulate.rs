@@ -1,0 +1,50 @@
+//! Rendered sequences on the disk.
+
+use std::path::PathBuf;
+
+use egomotion_io::simulated::{Options, SequenceFolder, World};
+use pyo3::exceptions::PyUserWarning;
+use pyo3::prelude::*;
+
+use crate::error;
+
+/// Render a sequence into a folder in KITTI odometry's layout, with its exact truth beside it, as `egomotion simulate`
+/// does. It gives back the number of frames.
+///
+/// `name` is one of `Sequence.names()`; `step` a factor of every motion; `size` (width, height); `noise` False leaves out
+/// the cameras' noise, `seed` is its seed, `texture` that of the surfaces; `scene` a `scene.toml`.
+#[pyfunction]
+#[pyo3(signature = (
+    name, out, *, step = 1.0, frames = None, size = None, noise = None, seed = None, texture = None, scene = None
+))]
+#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+pub fn simulate(
+    py: Python<'_>,
+    name: String,
+    out: PathBuf,
+    step: f64,
+    frames: Option<usize>,
+    size: Option<(usize, usize)>,
+    noise: Option<bool>,
+    seed: Option<u32>,
+    texture: Option<u32>,
+    scene: Option<PathBuf>,
+) -> PyResult<usize> {
+    if frames.is_some_and(|frames| !(2..=1_000_000).contains(&frames)) {
+        return Err(error::value("frames must be 2 to 1000000"));
+    }
+    let (seed, texture) = (seed.map(u64::from), texture.map(u64::from));
+    let options = Options { sequence: name, step, frames, size_px: size, noise, seed, texture, scene };
+    let world = py.detach(|| World::of(&options)).map_err(error::choice)?;
+    for warning in &world.warnings {
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &std::ffi::CString::new(warning.as_str())?, 1)?;
+    }
+    let folder = SequenceFolder::create(&out, world.frames).map_err(error::read)?;
+    folder.write_scene(&world).map_err(error::read)?;
+    for k in 0..world.frames {
+        py.detach(|| folder.write_frame(&world, k)).map_err(error::read)?;
+        py.check_signals()?;
+    }
+    folder.write_course(&world, world.frames).map_err(error::read)?;
+    Ok(world.frames)
+}
