@@ -60,7 +60,8 @@ pub fn size(path: &Path) -> Result<(usize, usize), IoError> {
 /// ignored.
 ///
 /// # Errors
-/// The content is no image of a known kind, is cut or corrupt, or has more than [`read::MAX_PIXELS`].
+/// The content is no image of a known kind, is cut or corrupt, or has more pixels than [`read::MAX_PIXELS`]
+/// or than its bytes can hold.
 pub fn decode(content: &[u8], path: &Path) -> Result<Image, IoError> {
     if !content.starts_with(PNG) {
         return other(content, path);
@@ -92,7 +93,7 @@ fn other(content: &[u8], path: &Path) -> Result<Image, IoError> {
     let decoder = reader.into_decoder().map_err(|error| broken(path, &error))?;
     let (width, height) = decoder.dimensions();
     let size = (width as usize, height as usize);
-    read::pixels(path, size.0, size.1)?;
+    read::pixels_of(path, size.0, size.1, content.len())?;
     let image = DynamicImage::from_decoder(decoder).map_err(|error| broken(path, &error))?;
     fn luma<T: Copy + Into<f32>>(samples: &[T]) -> Vec<f32> {
         let (pixels, _) = samples.as_chunks::<3>();
