@@ -40,6 +40,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         config: &config,
         frames: sequence.frames(),
         mask: None,
+        mask_right: None,
         tracks: false,
         progress: progress(sequence.frames(), args.quiet),
     };

@@ -13,6 +13,9 @@ use crate::{IoError, read};
 /// Rec. 601 luma of red, green and blue.
 pub const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
+/// 16-bit levels for each 8-bit one: 65535 is as white as 255.
+const WIDE: f32 = 257.0;
+
 /// Endings of the names of images that can be read, in small letters.
 pub const ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "tif", "tiff", "pgm", "ppm", "pnm"];
 
@@ -56,18 +59,19 @@ pub fn size(path: &Path) -> Result<(usize, usize), IoError> {
 
 /// A grey image from the content of a PNG, JPEG, TIFF, PGM or PPM file; `path` names it in errors.
 ///
-/// Grey levels are 0 … 255, or 0 … 65535 of a 16-bit file; colour becomes Rec. 601 luma; alpha is
-/// ignored.
+/// Grey levels are 0 … 255, those of a 16-bit file with their fractions: what is measured in an image is judged by
+/// the noise of such levels. Colour becomes Rec. 601 luma; alpha is ignored.
 ///
 /// # Errors
-/// The content is no image of a known kind, is cut or corrupt, or has more than [`read::MAX_PIXELS`].
+/// The content is no image of a known kind, is cut or corrupt, or has more pixels than [`read::MAX_PIXELS`]
+/// or than its bytes can hold.
 pub fn decode(content: &[u8], path: &Path) -> Result<Image, IoError> {
     if !content.starts_with(PNG) {
         return other(content, path);
     }
     let raster = Raster::decode(content, path)?;
     let levels = match raster.depth {
-        BitDepth::Sixteen => grey(&raster, |bytes: [u8; 2]| f32::from(u16::from_be_bytes(bytes))),
+        BitDepth::Sixteen => grey(&raster, |bytes: [u8; 2]| f32::from(u16::from_be_bytes(bytes)) / WIDE),
         _ => grey(&raster, |[byte]: [u8; 1]| f32::from(byte)),
     };
     grid(path, (raster.width, raster.height), levels)
@@ -92,19 +96,21 @@ fn other(content: &[u8], path: &Path) -> Result<Image, IoError> {
     let decoder = reader.into_decoder().map_err(|error| broken(path, &error))?;
     let (width, height) = decoder.dimensions();
     let size = (width as usize, height as usize);
-    read::pixels(path, size.0, size.1)?;
+    read::pixels_of(path, size.0, size.1, content.len())?;
     let image = DynamicImage::from_decoder(decoder).map_err(|error| broken(path, &error))?;
-    fn luma<T: Copy + Into<f32>>(samples: &[T]) -> Vec<f32> {
+    fn luma<T: Copy + Into<f32>>(samples: &[T], one: f32) -> Vec<f32> {
         let (pixels, _) = samples.as_chunks::<3>();
-        pixels.iter().map(|&[r, g, b]| LUMA[0] * r.into() + LUMA[1] * g.into() + LUMA[2] * b.into()).collect()
+        let level =
+            |&[r, g, b]: &[T; 3]| (LUMA[0] * r.into() + LUMA[1] * g.into() + LUMA[2] * b.into()) / one;
+        pixels.iter().map(level).collect()
     }
     let levels = match image {
         DynamicImage::ImageLuma8(grey) => grey.iter().map(|&level| f32::from(level)).collect(),
-        DynamicImage::ImageLuma16(grey) => grey.iter().map(|&level| f32::from(level)).collect(),
+        DynamicImage::ImageLuma16(grey) => grey.iter().map(|&level| f32::from(level) / WIDE).collect(),
         DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) | DynamicImage::ImageLumaA16(_) => {
-            luma(&image.into_rgb16())
+            luma(&image.into_rgb16(), WIDE)
         }
-        _ => luma(&image.into_rgb8()),
+        _ => luma(&image.into_rgb8(), 1.0),
     };
     grid(path, size, levels)
 }
@@ -175,14 +181,14 @@ mod tests {
         use {BitDepth::*, ColorType::*};
         let luma = 0.299 * 100.0 + 0.587 * 200.0 + 0.114 * 50.0;
         assert_eq!(levels(Grayscale, Eight, &[7, 250]), [7.0, 250.0]);
-        assert_eq!(levels(Grayscale, Sixteen, &[1, 2, 255, 255]), [258.0, 65535.0]);
+        assert_eq!(levels(Grayscale, Sixteen, &[1, 2, 255, 255]), [258.0 / 257.0, 255.0]);
         assert_eq!(levels(Grayscale, One, &[0b0100_0000]), [0.0, 255.0]);
         assert_eq!(levels(GrayscaleAlpha, Eight, &[7, 0, 250, 9]), [7.0, 250.0]);
         assert_eq!(levels(Indexed, One, &[0b0100_0000]), [0.0, luma]);
         assert_eq!(levels(Rgb, Eight, &[0, 0, 0, 100, 200, 50]), [0.0, luma]);
         assert_eq!(levels(Rgba, Eight, &[0, 0, 0, 0, 100, 200, 50, 3]), [0.0, luma]);
         let wide = levels(Rgba, Sixteen, &[0, 0, 0, 0, 0, 0, 0, 0, 100, 0, 200, 0, 50, 0, 9, 9]);
-        assert!((wide[1] - 256.0 * luma).abs() < 0.01);
+        assert!((wide[1] - 256.0 / 257.0 * luma).abs() < 1e-4);
     }
 
     #[test]
@@ -211,7 +217,7 @@ mod tests {
             assert!((image.at(16, 8) - 168.0).abs() < 4.0 && (image.at(3, 0) - 30.0).abs() < 4.0, "{name}");
             if format != ImageFormat::Jpeg {
                 assert_eq!(image.at(16, 8), 168.0);
-                assert_eq!(decode(&encoded(wide.clone().into(), format), &path).unwrap().at(16, 8), 16008.0);
+                assert_eq!(decode(&encoded(wide.clone().into(), format), &path).unwrap().at(16, 8), 16008.0 / 257.0);
             }
             let image = decode(&encoded(colour.clone().into(), format), &path).unwrap();
             assert!((image.at(5, 5) - luma).abs() < 2.0, "{name}: {}", image.at(5, 5));

@@ -26,7 +26,7 @@ impl Raster {
         decoder.set_transformations(Transformations::EXPAND);
         let mut reader = decoder.read_info().map_err(failed)?;
         let (width, height) = (reader.info().width as usize, reader.info().height as usize);
-        read::pixels(path, width, height)?;
+        read::pixels_of(path, width, height, content.len())?;
         let size = reader.output_buffer_size().ok_or_else(|| broken(path, &"it is too large"))?;
         let mut samples = vec![0; size];
         let frame = reader.next_frame(&mut samples).map_err(failed)?;

@@ -11,6 +11,10 @@ use crate::IoError;
 /// The most pixels that a decoded image or map may have, 2²⁸.
 pub const MAX_PIXELS: usize = 1 << 28;
 
+/// The most pixels that a byte of a file can stand for: deflate, the densest code of the formats read here, makes
+/// at most 1032 bytes of one (<https://zlib.net/zlib_tech.html>), and a pixel has at least one bit.
+const MAX_PIXELS_PER_BYTE: usize = 8 * 1032;
+
 /// The longest text file that is read, in bytes.
 const MAX_TEXT: u64 = 1 << 28;
 
@@ -94,4 +98,18 @@ pub(crate) fn pixels(path: &Path, width: usize, height: usize) -> Result<usize, 
     let count = width.checked_mul(height).filter(|n| (1..=MAX_PIXELS).contains(n));
     let reason = format_args!("has a size of {width}x{height} pixels").to_string();
     count.ok_or_else(|| IoError::new(path, reason, format_args!("give an image of 1 to {MAX_PIXELS} pixels")))
+}
+
+/// [`pixels`] of an image whose file has so many bytes, if they can hold them: nothing is allocated on the word of a
+/// head alone.
+///
+/// # Errors
+/// Names the file and the size.
+pub(crate) fn pixels_of(path: &Path, width: usize, height: usize, bytes: usize) -> Result<usize, IoError> {
+    let count = pixels(path, width, height)?;
+    if count <= bytes.saturating_mul(MAX_PIXELS_PER_BYTE) {
+        return Ok(count);
+    }
+    let reason = format_args!("has a size of {width}x{height} pixels, but only {bytes} bytes").to_string();
+    Err(IoError::new(path, reason, "the file is cut or damaged; replace it"))
 }

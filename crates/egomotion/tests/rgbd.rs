@@ -97,20 +97,29 @@ fn motion_is_as_good_as_stereos_and_its_covariance_true() {
 
 #[test]
 fn shape_alone_answers_where_there_is_no_texture() {
-    let sequence = sequence(2);
-    let truth = sequence.phi(0).unwrap();
-    let mut motion = RgbdMotion::new(camera(&sequence), Config::default()).unwrap();
-    let mut push = |k: usize| {
-        // A gradient in which corners and flow find nothing; the light grows, so that no frame repeats another.
-        let image = Grid::from_fn(320, 240, |u, _| 20.0 + 0.5 * u as f32 + k as f32);
-        motion.push(k as f64, image, &frame(&sequence, k, 3).1)
-    };
-    push(0);
-    let answer = push(1);
-    let estimate = answer.motion.as_ref().unwrap();
-    assert!(estimate.is_complete());
-    let deviation = (estimate.theta.mean - truth.vector()).norm();
-    assert!(deviation < 0.25 * truth.vector().norm(), "{deviation} {}", truth.vector().norm());
+    let sequence = sequence(3);
+    // Corners and flow find nothing in a gradient, whose light grows, nor in one grey level that never changes.
+    let gradient = |k: usize| Grid::from_fn(320, 240, |u, _| 20.0 + 0.5 * u as f32 + k as f32);
+    let constant = |_: usize| Grid::filled(320, 240, 90.0);
+    let images: [&dyn Fn(usize) -> Image; 2] = [&gradient, &constant];
+    for image in images {
+        let mut motion = RgbdMotion::new(camera(&sequence), Config::default()).unwrap();
+        motion.push(0.0, image(0), &frame(&sequence, 0, 3).1);
+        for k in 1..3 {
+            let truth = sequence.phi(k - 1).unwrap();
+            let answer = motion.push(k as f64, image(k), &frame(&sequence, k, 3).1);
+            let estimate = answer.motion.as_ref().unwrap();
+            assert!(estimate.is_complete());
+            let deviation = (estimate.theta.mean - truth.vector()).norm();
+            assert!(deviation < 0.25 * truth.vector().norm(), "{k}: {deviation} {}", truth.vector().norm());
+        }
+        let copy = motion.push(3.0, image(2), &frame(&sequence, 2, 3).1);
+        assert_eq!(copy.motion.unwrap_err(), Unanswered::RepeatedFrame);
+    }
+    // Without depth there is nothing to see.
+    let mut stereo = StereoMotion::new(sequence.rig, Config::default()).unwrap();
+    let blank = StereoFrame { time_s: 0.0, left: constant(0), right: constant(0) };
+    assert_eq!(stereo.push(blank).motion.unwrap_err().code(), "bad_image");
 }
 
 #[test]

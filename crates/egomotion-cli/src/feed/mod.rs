@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use egomotion::geometry::RigidMotion;
 use egomotion::pipeline::{Frame, TrackPoint, Unanswered};
 
-pub use reader::{Reader, halves};
+pub use reader::{Reader, halves, unseen};
 
 /// One frame as it comes out of its files.
 pub struct Fetched {

@@ -46,15 +46,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Pixels that the left image does not show, if there are any, where `true`.
-    ///
-    /// The right image needs no mask: a rectified view shows what both images have, and where a lens model
-    /// ends before that the right image is black, which matches no texture.
-    pub fn unseen(&self) -> Option<&Grid<bool>> {
-        let unseen = self.rectifier.as_ref().map(|rectifier| rectifier.left().unseen());
-        unseen.filter(|unseen| unseen.values().contains(&true))
-    }
-
     /// The images of a stereo pair.
     pub fn pair(sequence: &Sequence, files: &FrameFiles) -> Result<(Image, Image), Unanswered> {
         let right = files.right.as_ref().ok_or(Unanswered::MissingRight)?;
@@ -146,6 +137,13 @@ impl Reader<'_> {
             Some(rectifier) => rectified(rectifier.left(), image, &files.left),
         }
     }
+}
+
+/// Pixels that the left and the right image do not show, where there are any, `true`.
+pub fn unseen(rectifier: Option<&Rectifier>) -> [Option<Grid<bool>>; 2] {
+    let Some(rectifier) = rectifier else { return [None, None] };
+    [rectifier.left(), rectifier.right()]
+        .map(|map| Some(map.unseen()).filter(|unseen| unseen.values().contains(&true)).cloned())
 }
 
 /// The left and the right half of an image.

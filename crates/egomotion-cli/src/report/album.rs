@@ -2,8 +2,11 @@
 
 use super::pictures::FramePictures;
 
-/// Most frames of which a page shows pictures.
-const MOST_FRAMES: usize = 80;
+/// Most frames of which a page shows pictures: a step of the slider is then still narrower than the thumb.
+const MOST_FRAMES: usize = 48;
+
+/// Most frames a picture that an album begins with: a run may end early.
+const WIDEST_START: usize = 8;
 
 /// Most bytes of pictures: the page holds 4/3 of them, as text.
 const MOST_BYTES: usize = 5_600_000;
@@ -18,6 +21,7 @@ const WIDTHS_PX: (f64, f64) = (320.0, 960.0);
 #[derive(Debug, Clone)]
 pub struct Album {
     pictures: Vec<FramePictures>,
+    /// About so many pictures.
     expected: usize,
     stride: usize,
     offered: usize,
@@ -26,13 +30,14 @@ pub struct Album {
 impl Album {
     /// An album of a run of about so many frames.
     pub fn of(frames: usize) -> Self {
-        Self { pictures: Vec::new(), expected: frames, stride: 1, offered: 0 }
+        let stride = frames.div_ceil(MOST_FRAMES).next_power_of_two().min(WIDEST_START);
+        Self { pictures: Vec::new(), expected: frames.div_ceil(stride), stride, offered: 0 }
     }
 
     /// How wide to make pictures of images of `(width, height)`, so that those of all frames fit.
     pub fn width_px(&self, (width, height): (usize, usize)) -> usize {
-        let frames = self.expected.clamp(1, MOST_FRAMES) as f64;
-        let pixels = MOST_BYTES as f64 / frames / BYTES_PER_PIXEL;
+        let pictures = self.expected.clamp(1, MOST_FRAMES) as f64;
+        let pixels = MOST_BYTES as f64 / pictures / BYTES_PER_PIXEL;
         let fits = (pixels * width as f64 / height.max(1) as f64).sqrt();
         width.min(fits.clamp(WIDTHS_PX.0, WIDTHS_PX.1) as usize)
     }

@@ -1,6 +1,5 @@
 //! Small pictures of images and maps, compressed at once; the colours of the maps are put in when the page is made.
 
-use egomotion::estimate::median;
 use egomotion::geometry::{Grid, Image};
 use egomotion::metrics::quantile;
 use egomotion::motion::TimeToImpact;
@@ -11,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bytes;
 use crate::chart::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Rgb, Spread, VIRIDIS};
-use crate::chart::raster::{encode, recolour, reduce};
+use crate::chart::raster::{centres, encode, means, recolour};
 
 /// Quality of the JPEG pictures of the left image, of 100.
 const JPEG_QUALITY: u8 = 70;
@@ -20,6 +19,9 @@ const JPEG_QUALITY: u8 = 70;
 const LEVELS: u8 = 48;
 /// The same of a σ, which varies from pixel to pixel and is read coarsely: half the bytes.
 const SIGMA_LEVELS: u8 = 16;
+
+/// Pixels that tell the quantiles of a picture.
+const ENOUGH: usize = 10_000;
 
 /// The maps, each quantity followed by its σ.
 pub const QUANTITIES: [Quantity; 6] = [
@@ -137,16 +139,10 @@ fn sigma_s(impact: &TimeToImpact) -> Option<f64> {
 /// The picture of quantity `i`, whose values are `factor` times those of `plane`.
 fn map(plane: &Grid<f32>, factor: f64, i: usize, width_px: usize) -> MapPicture {
     let spread = QUANTITIES[i].spread;
-    let coordinates = reduce(plane, width_px, |block| {
-        let (mut all, mut present) = (0, Vec::with_capacity(16));
-        for value in block {
-            all += 1;
-            present.extend(value.is_finite().then(|| factor * f64::from(value)));
-        }
-        // A pixel of the picture is missing where most of what it stands for is.
-        if 2 * present.len() >= all { spread.coordinate(median(&mut present)) } else { f64::NAN }
-    });
-    let mut present: Vec<f64> = coordinates.values().iter().copied().filter(|c| c.is_finite()).collect();
+    let values = centres(plane, width_px);
+    let (width, height) = values.size();
+    let coordinates = Grid::from_fn(width, height, |u, v| spread.coordinate(factor * values.at(u, v)));
+    let mut present: Vec<f64> = sample(&coordinates).filter(|c| c.is_finite()).collect();
     present.sort_unstable_by(f64::total_cmp);
     let between = |low: f64, high: f64| of_sorted(&present, low).zip(of_sorted(&present, high));
     let ends = between(0.005, 0.995).unwrap_or((0.0, 1.0));
@@ -156,7 +152,6 @@ fn map(plane: &Grid<f32>, factor: f64, i: usize, width_px: usize) -> MapPicture 
         let share = if high > low { (c - low) / (high - low) } else { 0.5 };
         1 + (share.clamp(0.0, 1.0) * f64::from(levels - 1)).round() as u8
     };
-    let (width, height) = coordinates.size();
     let indices = Grid::from_fn(width, height, |u, v| {
         let c = coordinates.at(u, v);
         if c.is_finite() { level(c) } else { 0 }
@@ -187,15 +182,18 @@ impl MapPicture {
 
 /// Grey levels from black to the brightest, 8 bit.
 fn grey(image: &Image, width_px: usize) -> Grid<u8> {
-    let mean = reduce(image, width_px, |block| {
-        let (sum, n) = block.filter(|v| v.is_finite()).fold((0.0, 0), |(s, n), v| (s + f64::from(v), n + 1));
-        sum / f64::from(n.max(1))
-    });
-    let brightest = quantile(mean.values(), 0.999).unwrap_or(0.0).max(1.0);
+    let mean = means(image, width_px);
+    let brightest = quantile(&sample(&mean).collect::<Vec<_>>(), 0.999).unwrap_or(0.0).max(1.0);
     // Eight-bit images keep their exposure, others are scaled.
     let white = if brightest <= 255.0 { 255.0 } else { brightest };
     let level = |v: f64| ((v / white).clamp(0.0, 1.0) * 255.0).round() as u8;
     Grid::from_fn(mean.width(), mean.height(), |u, v| level(mean.at(u, v)))
+}
+
+/// Enough of a picture's values to tell their quantiles.
+fn sample(values: &Grid<f64>) -> impl Iterator<Item = f64> {
+    let every = values.values().len().div_ceil(ENOUGH).max(1);
+    values.values().iter().step_by(every).copied()
 }
 
 /// `None` for an empty picture.

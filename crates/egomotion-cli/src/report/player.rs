@@ -63,8 +63,9 @@ pub fn shown(report: &Report<'_>, stops: &[Stop]) -> Option<String> {
     match (pictured, stride) {
         (true, 1) => None,
         (true, n) => Some(format!(
-            "Pictures are kept of {} out of {frames}, every {n}th of those that gave any, so that the page stays small.",
-            stops.len()
+            "Pictures are kept of {} out of {frames}, every {} of those that gave any, so that the page stays small.",
+            stops.len(),
+            if n == 2 { "second".into() } else { format!("{n}th") }
         )),
         (false, _) if stops.len() + 1 < report.frames.len() => {
             Some(format!("The slider stops at {} evenly spaced frames out of {frames}.", stops.len()))

@@ -23,7 +23,7 @@ pub fn viewer(report: &Report<'_>, stops: &[Stop]) -> Markup {
             h2 { "What the camera saw" @if maps { ", and what every pixel says" } }
             p {
                 @if pictures.is_empty() { "There are no pictures: no two good frames could be compared. " }
-                @if stops.len() > 1 { "Move the slider, press the arrow keys or touch a chart: all marks and pictures follow. " }
+                @if stops.len() > 1 { span class="onscreen" { "Move the slider, press the arrow keys or touch a chart: all marks and pictures follow. " } }
                 @if report.eyes == Eyes::Tracks { "The run was given points that another program followed, and no images." }
                 @else if report.sparse { "This run followed corners alone (" code { "--observe sparse" } "), which is fast but makes no maps of every pixel." }
             }

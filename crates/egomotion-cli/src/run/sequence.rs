@@ -48,7 +48,8 @@ pub fn run_sequence(
         ..feed::Reader::new(sequence, uses_depth(args, sequence))
     };
     let mask = args.mask.as_deref().map(|path| read_mask(path, &rig)).transpose()?;
-    let mask = joined(mask, reader.unseen());
+    let [unseen, mask_right] = feed::unseen(reader.rectifier.as_ref());
+    let mask = joined(mask, unseen);
     let folder = ResultFolder::create(out)?;
     let cameras = Cameras::of(sequence);
     let settings =
@@ -69,7 +70,7 @@ pub fn run_sequence(
     let bar = progress(frames.len(), args.quiet);
     bar.set_message(sequence.name.clone());
     let session =
-        Session { rig, config, frames: frames.len(), mask, tracks: tracks.is_some(), progress: bar };
+        Session { rig, config, frames: frames.len(), mask, mask_right, tracks: tracks.is_some(), progress: bar };
     let mut truth_maps: Option<MapVerdict> = None;
     let outcome = session.run(
         log,
@@ -217,8 +218,12 @@ fn read_mask(path: &Path, rig: &StereoRig) -> Result<Grid<bool>> {
 }
 
 /// Pixels that either mask excludes.
-fn joined(mask: Option<Grid<bool>>, unseen: Option<&Grid<bool>>) -> Option<Grid<bool>> {
-    let (Some(mut mask), Some(unseen)) = (mask.clone(), unseen) else { return mask.or(unseen.cloned()) };
-    mask.values_mut().iter_mut().zip(unseen.values()).for_each(|(masked, unseen)| *masked |= unseen);
-    Some(mask)
+fn joined(mask: Option<Grid<bool>>, unseen: Option<Grid<bool>>) -> Option<Grid<bool>> {
+    match (mask, unseen) {
+        (Some(mut mask), Some(unseen)) => {
+            mask.values_mut().iter_mut().zip(unseen.values()).for_each(|(masked, unseen)| *masked |= unseen);
+            Some(mask)
+        }
+        (mask, unseen) => mask.or(unseen),
+    }
 }

@@ -26,8 +26,10 @@ pub struct Session<'a> {
     pub config: &'a Config,
     /// Number of frames, as far as it is known.
     pub frames: usize,
-    /// Pixels never to use.
+    /// Pixels of the left image never to use.
     pub mask: Option<Grid<bool>>,
+    /// The same of the right image.
+    pub mask_right: Option<Grid<bool>>,
     /// Frames are tracks, not images.
     pub tracks: bool,
     pub progress: ProgressBar,

@@ -23,6 +23,7 @@ impl Pipeline {
         }
         let mut images = StereoMotion::new(session.rig, config)?;
         images.set_mask(session.mask.clone());
+        images.set_right_mask(session.mask_right.clone());
         Ok(Self::Images(Box::new(images)))
     }
 

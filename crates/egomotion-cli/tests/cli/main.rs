@@ -12,6 +12,7 @@ mod given;
 mod impact;
 mod info;
 mod interrupt;
+mod karlsruhe;
 mod maps;
 mod outputs;
 mod process;

@@ -81,6 +81,31 @@ fn plain_folders_with_any_kind_of_images() {
     }
 }
 
+#[test]
+fn sixteen_bits_are_finer_levels_of_the_same_grey() {
+    for (ending, options) in [("png", ""), ("tif", "--observe sparse")] {
+        let folder = TempDir::new().unwrap();
+        for (k, (left, right)) in images().iter().enumerate() {
+            for (side, picture) in [("left", left), ("right", right)] {
+                let place = folder.path().join(side);
+                fs::create_dir_all(&place).unwrap();
+                let (width, height) = picture.size();
+                let levels = picture.values().iter().map(|&level| 257 * level as u16).collect();
+                let wide = ::image::ImageBuffer::<::image::Luma<u16>, Vec<u16>>::from_raw(
+                    width as u32,
+                    height as u32,
+                    levels,
+                );
+                wide.unwrap().save(place.join(format!("{k}.{ending}"))).unwrap();
+            }
+        }
+        fs::write(folder.path().join("rig.toml"), rig_toml("")).unwrap();
+        let out = TempDir::new().unwrap();
+        run(folder.path(), out.path(), options);
+        assert_same(&rows(out.path()), &usual(options));
+    }
+}
+
 fn write_as(path: &Path, picture: &Image) {
     if path.extension().is_some_and(|ending| ending == "png") {
         return image::write_grey(path, picture).unwrap();

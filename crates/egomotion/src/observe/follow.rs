@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::disparity::GUESS_SIGMA_PX;
 use super::patch::{Freedom, Located, Patch, Settling};
 use super::stereo_pyramid::StereoPyramid;
-use super::tracks::{Across, Expected, Hints, StereoCorner, Trace, TrackOptions};
+use super::tracks::{Across, Expected, Hints, StereoCorner, Trace, TrackOptions, is_masked};
 use crate::geometry::{StereoRig, Twist};
 
 /// A place is found when a step is shorter than this, in pixels; steps shrink tenfold each.
@@ -34,8 +34,7 @@ impl Follower<'_> {
     /// A corner of the earlier frame in the later one.
     pub(super) fn trace(&self, corner: &StereoCorner) -> Option<Trace> {
         let (next, scale) = self.in_time(corner)?;
-        let (u, v) = (next.u.round() as usize, next.v.round() as usize);
-        if self.hints.mask.is_some_and(|m| u < m.width() && v < m.height() && m.at(u, v)) {
+        if self.hints.mask.is_some_and(|mask| is_masked(mask, next.u, next.v)) {
             return None;
         }
         let after =
@@ -73,6 +72,9 @@ impl Follower<'_> {
         }
         let found =
             patch.locate(&frame.right_spline, (u - shift, v), Freedom::Row, self.settling(SETTLED_PX))?;
+        if self.hints.mask_right.is_some_and(|mask| is_masked(mask, found.u, found.v)) {
+            return None;
+        }
         let shift = u - found.u;
         if !self.acceptable(&patch, &found) || self.rig.disparity_from_shift(shift) <= 0.0 {
             return None;

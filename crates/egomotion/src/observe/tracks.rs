@@ -66,8 +66,10 @@ pub struct Hints<'a> {
     pub shift: Option<&'a Field>,
     /// Expected scene motion, left camera.
     pub motion: Option<&'a Twist>,
-    /// Pixels never to use, where `true`.
+    /// Pixels of the left image never to use, where `true`.
     pub mask: Option<&'a Grid<bool>>,
+    /// The same of the right image.
+    pub mask_right: Option<&'a Grid<bool>>,
     /// Disparity of the earlier and the later frame, which takes the place of their right images.
     pub given: Option<[&'a DisparityMap; 2]>,
 }
@@ -150,7 +152,7 @@ pub fn stereo_corners(
     let Some(image) = frame.left.levels().first() else { return all };
     let mut found = corners(image, &cells, &taken, options.least_strength);
     if let Some(mask) = hints.mask {
-        found.retain(|c| c.u < mask.width() && c.v < mask.height() && !mask.at(c.u, c.v));
+        found.retain(|c| !is_masked(mask, c.u as f64, c.v as f64));
     }
     let follower = Follower { before: frame, after: frame, rig, hints, options, expected: Expected::Near };
     let locate = |corner: &super::corners::Corner| {
@@ -164,6 +166,12 @@ pub fn stereo_corners(
     let new: Vec<Option<StereoCorner>> = found.par_iter().map(locate).collect();
     all.extend(new.into_iter().flatten());
     all
+}
+
+/// Whether a place belongs to a masked pixel.
+pub(super) fn is_masked(mask: &Grid<bool>, u: f64, v: f64) -> bool {
+    let (u, v) = (u.round() as usize, v.round() as usize);
+    u < mask.width() && v < mask.height() && mask.at(u, v)
 }
 
 /// Corners of `before` followed to `after`; the order is theirs.

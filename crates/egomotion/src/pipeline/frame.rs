@@ -43,6 +43,16 @@ impl From<StereoFrame> for Frame {
 const LEAST_CONTRAST: f64 = 1.0;
 
 impl Frame {
+    /// Whether depth is given in place of a right image, so that shape tells of motion where texture does not.
+    fn is_shape(&self) -> bool {
+        self.right.is_none() && self.disparity.is_some()
+    }
+
+    /// Whether nothing but its shape tells it from another frame.
+    pub(super) fn is_blank(&self) -> bool {
+        self.is_shape() && contrast(&self.left) < LEAST_CONTRAST
+    }
+
     /// Whether its images and maps can be used with a rig.
     pub(super) fn check(&self, rig: &StereoRig) -> Result<(), Unanswered> {
         let expected = (rig.width_px, rig.height_px);
@@ -59,7 +69,7 @@ impl Frame {
                     "the {side} image has values that are not numbers"
                 )));
             }
-            if contrast < LEAST_CONTRAST {
+            if contrast < LEAST_CONTRAST && !self.is_shape() {
                 return Err(Unanswered::BadImage(format!("the {side} image is constant")));
             }
         }
@@ -105,6 +115,19 @@ pub(super) fn erase(field: &mut Field, mask: &Grid<bool>) {
     for v in 0..field.height().min(mask.height()) {
         for (value, &masked) in field.row_mut(v).iter_mut().zip(mask.row(v)) {
             if masked {
+                *value = f32::NAN;
+            }
+        }
+    }
+}
+
+/// Clear the shifts whose pixel of the right image the mask excludes.
+pub(super) fn erase_partners(shift: &mut Field, mask: &Grid<bool>) {
+    for v in 0..shift.height().min(mask.height()) {
+        for (u, value) in shift.row_mut(v).iter_mut().enumerate() {
+            // NaN and what lies left of the image become 0, which the first column answers for.
+            let partner = (u as f32 - *value).round() as usize;
+            if partner < mask.width() && mask.at(partner, v) {
                 *value = f32::NAN;
             }
         }

@@ -38,7 +38,8 @@ pub(super) struct FramePair<'a> {
     pub(super) after: &'a Reference,
     pub(super) rig: &'a StereoRig,
     pub(super) config: &'a Config,
-    pub(super) mask: Option<&'a Grid<bool>>,
+    /// Pixels of the left and of the right image never to use.
+    pub(super) masks: [Option<&'a Grid<bool>>; 2],
 }
 
 pub(super) struct PairResult {
@@ -133,7 +134,7 @@ impl FramePair<'_> {
         let maps = self.before.disparity.as_ref().zip(self.after.disparity.as_ref());
         let both_right = self.before.images.has_right() && self.after.images.has_right();
         let given = maps.filter(|_| !both_right).map(|(before, after)| [before, after]);
-        Hints { shift, motion, mask: self.mask, given }
+        Hints { shift, motion, mask: self.masks[0], mask_right: self.masks[1], given }
     }
 
     fn solver(&self) -> TrackSolver<'_> {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::config::{Config, ConfigError, Observe};
-use super::frame::{Frame, erase};
+use super::frame::{Frame, erase, erase_partners};
 use super::frame_pair::{FramePair, Reference, timed};
 use super::groups::MovingGroup;
 use super::maps::MotionMaps;
@@ -118,6 +118,7 @@ pub struct StereoMotion {
     config: Config,
     matcher: DisparityMatcher,
     mask: Option<Grid<bool>>,
+    mask_right: Option<Grid<bool>>,
     frames: usize,
     last_time_s: Option<f64>,
     reference: Option<Reference>,
@@ -133,6 +134,11 @@ pub struct StereoMotion {
 /// After this many good frames without an answer the reference itself is given up.
 pub(super) const MOST_FAILURES: usize = 2;
 
+/// What a map says, missing pixels included, for comparison.
+fn bits(map: &DisparityMap) -> Vec<u32> {
+    map.shift.grid().values().iter().map(|value| value.to_bits()).collect()
+}
+
 impl StereoMotion {
     /// A pipeline for one rig.
     ///
@@ -146,6 +152,7 @@ impl StereoMotion {
             matcher: DisparityMatcher::new(config.disparity.clone()),
             config,
             mask: None,
+            mask_right: None,
             frames: 0,
             last_time_s: None,
             reference: None,
@@ -164,6 +171,12 @@ impl StereoMotion {
     /// Pixels of the left image that are never used (a bonnet, a rotor), where `true`.
     pub fn set_mask(&mut self, mask: Option<Grid<bool>>) {
         self.mask = mask;
+    }
+
+    /// Pixels of the right image that show nothing (beyond a lens or the raw image), where `true`: no disparity
+    /// leads there.
+    pub fn set_right_mask(&mut self, mask: Option<Grid<bool>>) {
+        self.mask_right = mask;
     }
 
     /// The frame that the next one will be matched with.
@@ -187,19 +200,21 @@ impl StereoMotion {
         }
         self.last_time_s = Some(frame.time_s);
         let mut stages = StageTimes::default();
+        let blank = frame.is_blank();
         let here = self.prepared(frame, &mut stages);
         let Some(mut before) = self.reference.take() else {
             let first = self.skip(here.time_s, Unanswered::First);
             self.reference = Some(here);
             return first;
         };
-        if here.images.repeats(&before.images) {
+        let same_shape = || here.disparity.as_ref().map(bits) == before.disparity.as_ref().map(bits);
+        if here.images.repeats(&before.images) && (!blank || same_shape()) {
             let repeated = self.skip(here.time_s, Unanswered::RepeatedFrame);
             (self.reference, self.spare) = (Some(before), Some(here.images));
             return repeated;
         }
-        let mask = self.mask.as_ref();
-        let pair = FramePair { before: &before, after: &here, rig: &self.rig, config: &self.config, mask };
+        let masks = [self.mask.as_ref(), self.mask_right.as_ref()];
+        let pair = FramePair { before: &before, after: &here, rig: &self.rig, config: &self.config, masks };
         let result = pair.motion(self.velocity.as_ref(), &mut self.flow_space, &mut stages);
         let dt_s = pair.dt_s();
         // After an answer the earlier frame is not needed again.
@@ -282,6 +297,9 @@ impl StereoMotion {
         };
         if let Some(mask) = &self.mask {
             erase(&mut map.shift, mask);
+        }
+        if let Some(mask) = &self.mask_right {
+            erase_partners(&mut map.shift, mask);
         }
         Some(map)
     }

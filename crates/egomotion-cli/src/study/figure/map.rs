@@ -2,7 +2,6 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use egomotion::estimate::median;
 use egomotion::geometry::{Field, Grid, Image};
 use maud::{Markup, html};
 
@@ -10,7 +9,7 @@ use super::axis::{TICK_PX, width};
 use super::{PANEL_WIDTH, Room, TITLE_PX};
 use crate::chart::colour::{ColourMap, DIVERGING, Rgb, VIRIDIS};
 use crate::chart::plot::Scale;
-use crate::chart::raster::{encode, reduce};
+use crate::chart::raster::{centres, encode, means};
 
 /// Most columns of an embedded picture.
 const MOST_COLUMNS: usize = 640;
@@ -97,10 +96,7 @@ impl<'a> Map<'a> {
     }
 
     fn png(&self) -> Option<Vec<u8>> {
-        let small = reduce(self.field.grid(), MOST_COLUMNS, |block| {
-            let mut present: Vec<f64> = block.filter(|v| !v.is_nan()).map(f64::from).collect();
-            median(&mut present)
-        });
+        let small = centres(self.field.grid(), MOST_COLUMNS);
         let (low, high) = self.range;
         let index = |v: f64| {
             if v.is_nan() {
@@ -125,11 +121,7 @@ pub fn picture_height(image: &Image) -> f64 {
 /// A picture in grey levels.
 pub fn picture(image: &Image, height: f64, name: &str) -> Markup {
     let place = Place::inside(image.size(), Room::RIGHT, height);
-    let small = reduce(image, MOST_COLUMNS, |block| {
-        let (sum, count) =
-            block.filter(|v| v.is_finite()).fold((0.0, 0), |(s, k), v| (s + f64::from(v), k + 1));
-        sum / f64::from(count.max(1))
-    });
+    let small = means(image, MOST_COLUMNS);
     let (wide, tall) = small.size();
     let levels = Grid::from_fn(wide, tall, |u, v| small.at(u, v).clamp(0.0, 255.0).round() as u8);
     html! { (place.image(encode(&levels, None), name)) (place.rect("none")) }
