@@ -14,6 +14,7 @@ mod measured;
 mod observations;
 mod observe;
 mod pipeline;
+mod recording;
 mod rig;
 mod rows;
 mod simulate;
@@ -51,6 +52,8 @@ mod _native {
     use crate::observe::{disparity, flow, track};
     #[pymodule_export]
     use crate::pipeline::{RgbdMotion, StereoMotion};
+    #[pymodule_export]
+    use crate::recording::{Run, run, sequences};
     #[pymodule_export]
     use crate::rig::Rig;
     #[pymodule_export]

@@ -4,6 +4,7 @@ use egomotion::geometry::Twist;
 use egomotion::observe::tracks::{Hints, stereo_tracks};
 use egomotion::observe::{DisparityMap, DisparityMatcher, Pyramid, StereoPyramid, dense_flow};
 use egomotion::pipeline::Config;
+use egomotion_io::given;
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -15,11 +16,8 @@ use crate::geometry::twist;
 use crate::observations::StereoTracks;
 use crate::rig::Rig;
 
-/// Standard deviation of a given disparity that comes without one, in pixels: as the command has it.
-const GIVEN_SIGMA_PX: f32 = 0.3;
-
 /// A disparity map that the caller has.
-pub fn given(
+pub fn given_map(
     shift: Option<&Bound<'_, PyAny>>,
     sigma: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Option<DisparityMap>> {
@@ -30,7 +28,7 @@ pub fn given(
         };
     };
     let shift = arrays::field("disparity", shift)?;
-    let Some(sigma) = sigma else { return Ok(Some(DisparityMap::given(shift, |_| GIVEN_SIGMA_PX))) };
+    let Some(sigma) = sigma else { return Ok(Some(DisparityMap::given(shift, |_| given::SIGMA_PX))) };
     let sigma = arrays::field("disparity_sigma", sigma)?;
     if sigma.size() != shift.size() {
         return Err(error::value("disparity and disparity_sigma differ in size"));

@@ -12,7 +12,7 @@ use crate::arrays;
 use crate::config::{Threads, config};
 use crate::error;
 use crate::frame_motion::FrameMotion;
-use crate::observe::given;
+use crate::observe::given_map;
 use crate::rig::Rig;
 
 /// Turns a sequence of rectified stereo images into motion.
@@ -66,7 +66,7 @@ impl StereoMotion {
     ) -> PyResult<FrameMotion> {
         let left = arrays::image("left", left)?;
         let right = right.map(|right| arrays::image("right", right)).transpose()?;
-        let disparity = given(disparity, disparity_sigma)?;
+        let disparity = given_map(disparity, disparity_sigma)?;
         let frame = match (right, disparity) {
             (Some(right), None) => StereoFrame { time_s: time, left, right }.into(),
             (None, None) => return Err(PyValueError::new_err("give the right image, or a disparity map")),

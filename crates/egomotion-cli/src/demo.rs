@@ -12,7 +12,6 @@ use egomotion::sim::{SensorNoise, Sequence, StereoImages};
 
 use crate::Ending;
 use crate::args::DemoArgs;
-use crate::feed::{Fetched, Given};
 use crate::judge::MapTally;
 use crate::report::Eyes;
 use crate::results::{About, ResultFolder};
@@ -20,6 +19,7 @@ use crate::run::set_threads;
 use crate::session::{Outcome, Row, Session, progress, stop_signal};
 use crate::summary::Summary;
 use crate::terminal;
+use egomotion_io::recording::{Fetched, Given};
 
 /// Rays along each side of a pixel that shows an edge.
 const SAMPLES: usize = 3;
@@ -39,8 +39,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         rig: sequence.rig,
         config: &config,
         frames: sequence.frames(),
-        mask: None,
-        mask_right: None,
+        masks: [None, None],
         tracks: false,
         progress: progress(sequence.frames(), args.quiet),
     };

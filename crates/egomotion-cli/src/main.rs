@@ -5,7 +5,6 @@ mod chart;
 mod config;
 mod demo;
 mod evaluate;
-mod feed;
 mod info;
 mod journal;
 mod judge;

@@ -12,12 +12,12 @@ use egomotion::metrics::quantile;
 use egomotion::observe::{DisparityMap, DisparityMatcher};
 use egomotion::pipeline::Config;
 use egomotion_io::motion_table::{self, MotionRow};
+use egomotion_io::recording::Reader;
 use egomotion_io::source::{Sequence, Source};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::args::{MapFormat, RunArgs};
-use crate::feed::Reader;
 use crate::maps::MapFiles;
 use crate::results::ResultFolder;
 use crate::run::complete_before;

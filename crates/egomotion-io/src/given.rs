@@ -6,6 +6,9 @@ use egomotion::geometry::Field;
 
 use crate::{IoError, disparity_png, flo, flow_png, npy, pfm};
 
+/// Standard deviation of a given disparity or flow that comes without one, in pixels.
+pub const SIGMA_PX: f32 = 0.3;
+
 /// Formats of a disparity map, in the order in which they are looked for.
 pub const DISPARITY: &[&str] = &["pfm", "npy", "png"];
 /// Formats of a flow map, in the order in which they are looked for.

@@ -32,6 +32,7 @@ pub mod pfm;
 pub mod ply;
 mod raster;
 pub mod read;
+pub mod recording;
 pub mod simulated;
 pub mod source;
 pub mod stream;

@@ -343,6 +343,22 @@ class RgbdMotion:
     def push(self, image: npt.ArrayLike, depth: npt.ArrayLike, time: float) -> FrameMotion: ...
 
 @final
+class Run:
+    """A recording on its way through the pipeline: an iterator of `FrameMotion`."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def rig(self) -> StereoRig: ...
+    @property
+    def poses(self) -> _F64: ...
+    @property
+    def times(self) -> _F64: ...
+    def __len__(self) -> int: ...
+    def __iter__(self) -> Run: ...
+    def __next__(self) -> FrameMotion: ...
+
+@final
 class Sequence:
     """A rendered sequence: poses, exact motions, images, true maps."""
 
@@ -441,6 +457,24 @@ def maximum_likelihood(
 ) -> tuple[Estimate, float]: ...
 def robust_scale(median_square: float, n: int, p: int) -> float: ...
 def rotation_and_u(phi: npt.ArrayLike, dt: float = 1.0) -> tuple[_F64, _F64]: ...
+def run(
+    path: _Path,
+    *,
+    sequence: str | None = None,
+    calibration: _Path | None = None,
+    start: int = 0,
+    frames: int | None = None,
+    stride: int = 1,
+    reverse: bool = False,
+    sensor: Literal["stereo", "depth"] | None = None,
+    disparity: _Path | None = None,
+    flow: _Path | None = None,
+    tracks: _Path | None = None,
+    mask: _Path | None = None,
+    threads: int | None = None,
+    **settings: Any,
+) -> Run: ...
+def sequences(path: _Path, *, calibration: _Path | None = None) -> list[str]: ...
 def seen_from(phi: npt.ArrayLike, centre: npt.ArrayLike) -> _F64: ...
 def simulate(
     name: str,

@@ -11,7 +11,7 @@ use crate::study::StudyCommand;
 use egomotion_io::simulated::{self, check_size};
 
 pub use evaluate::EvaluateArgs;
-pub use run::{ApproachArg, CloudArg, EstimatorArg, MapFormat, MethodArg, ObserveArg, RunArgs, SensorArg};
+pub use run::{ApproachArg, CloudArg, EstimatorArg, MapFormat, MethodArg, ObserveArg, RunArgs};
 
 /// 3D motion, depth velocity and time to impact from stereo, each with an uncertainty that can be trusted.
 #[derive(Debug, Parser)]

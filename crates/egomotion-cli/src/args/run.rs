@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
+use egomotion_io::recording::{Choice, Sensor};
 use serde::{Serialize, Serializer};
 
 use super::positive;
@@ -116,6 +117,24 @@ pub struct RunArgs {
 }
 
 impl RunArgs {
+    /// What is taken of the recording.
+    pub fn choice(&self) -> Choice {
+        Choice {
+            start: self.start,
+            frames: self.frames,
+            stride: Some(self.stride),
+            reverse: self.reverse,
+            sensor: self.sensor.map(|sensor| match sensor {
+                SensorArg::Stereo => Sensor::Stereo,
+                SensorArg::Depth => Sensor::Depth,
+            }),
+            disparity: self.disparity.clone(),
+            flow: self.flow.clone(),
+            tracks: self.tracks.clone(),
+            mask: self.mask.clone(),
+        }
+    }
+
     /// What is written of each frame pair.
     pub fn map_files(&self) -> MapFiles {
         let mut formats = self.maps_as.clone();

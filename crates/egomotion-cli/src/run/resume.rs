@@ -7,13 +7,12 @@ use anyhow::{Context, Result, bail};
 use egomotion::geometry::StereoRig;
 use egomotion::pipeline::Config;
 use egomotion_io::IoError;
-use egomotion_io::source::FrameFiles;
+use egomotion_io::recording::Recording;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::args::RunArgs;
-use crate::feed::Reader;
 use crate::journal::{ANEW, Head, Journal, Parts};
 use crate::session::Log;
 use crate::summary::Cameras;
@@ -97,17 +96,11 @@ fn told(summary: &Value, head: &Head) -> Head {
 ///
 /// # Errors
 /// As [`open`]; and the recording was changed since.
-pub fn log(
-    out: &Path,
-    head: &Head,
-    resume: bool,
-    frames: &[(&FrameFiles, f64)],
-    reader: &Reader<'_>,
-) -> Result<Option<Log>> {
+pub fn log(out: &Path, head: &Head, resume: bool, recording: &Recording) -> Result<Option<Log>> {
     let Some((journal, parts)) = open(out, head, resume)? else { return Ok(None) };
     let log = Log::new(journal, parts);
-    for (done, (files, time_s)) in log.past().zip(frames) {
-        let (row, bytes) = (&done.row, reader.bytes(files));
+    for (k, (done, (files, time_s))) in log.past().zip(&recording.frames).enumerate() {
+        let (row, bytes) = (&done.row, recording.bytes(k));
         let change = if row.index != files.index {
             format!("it was number {}", row.index)
         } else if row.motion.time_s != *time_s {

@@ -3,20 +3,19 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use anyhow::{Result, anyhow, bail};
-use egomotion::geometry::{Grid, StereoRig};
-use egomotion::pipeline::{Config, Observe, Unanswered};
-use egomotion_io::source::{FrameFiles, Sequence};
-use egomotion_io::{image, tracks};
+use anyhow::Result;
+use egomotion::pipeline::{Config, Unanswered};
+use egomotion_io::recording::Recording;
+use egomotion_io::source::Sequence;
 
 use super::resume::{self, Settings};
-use crate::args::{RunArgs, SensorArg};
+use crate::args::RunArgs;
 use crate::judge::{self, MapVerdict};
 use crate::report::Eyes;
 use crate::results::{About, ResultFolder};
 use crate::session::{Outcome, Row, Session, progress};
 use crate::summary::{Cameras, Summary};
-use crate::{Usage, feed, terminal};
+use crate::{Usage, refusal, terminal};
 
 /// A finished sequence.
 pub struct DoneSequence {
@@ -34,29 +33,15 @@ pub fn run_sequence(
     stop: &AtomicBool,
     alone: bool,
 ) -> Result<Option<DoneSequence>> {
-    let frames = select(args, sequence)?;
-    let rig = sequence.rig.ok_or_else(|| {
-        anyhow!("{}: no calibration; give one with --calibration FILE", args.source.display())
-    })?;
-    let tracks = args.tracks.as_deref().or(sequence.tracks.as_deref()).map(tracks::read).transpose()?;
-    let config = &suited(args, config, tracks.is_some())?;
-    check_sensor(args, sequence)?;
-    let reader = feed::Reader {
-        disparity: args.disparity.as_deref(),
-        flow: args.flow.as_deref(),
-        tracks: tracks.as_ref(),
-        ..feed::Reader::new(sequence, uses_depth(args, sequence))
-    };
-    let mask = args.mask.as_deref().map(|path| read_mask(path, &rig)).transpose()?;
-    let [unseen, mask_right] = feed::unseen(reader.rectifier.as_ref());
-    let mask = joined(mask, unseen);
+    let recording = Recording::open(&args.source, sequence, &args.choice()).map_err(refusal)?;
+    let (rig, frames) = (recording.rig, recording.len());
+    let config = &suited(args, config, &recording)?;
     let folder = ResultFolder::create(out)?;
     let cameras = Cameras::of(sequence);
-    let settings =
-        Settings { options: args, config, rig: Some(&rig), cameras: cameras.clone(), frames: frames.len() };
+    let settings = Settings { options: args, config, rig: Some(&rig), cameras: cameras.clone(), frames };
     let mut log = None;
     if alone {
-        log = resume::log(out, &settings.head()?, args.resume, &frames, &reader)?;
+        log = resume::log(out, &settings.head()?, args.resume, &recording)?;
         if log.is_none() {
             return Ok(None);
         }
@@ -67,15 +52,21 @@ pub fn run_sequence(
         folder.sweep()?;
         maps.sweep(out)?;
     }
-    let bar = progress(frames.len(), args.quiet);
+    let bar = progress(frames, args.quiet);
     bar.set_message(sequence.name.clone());
-    let session =
-        Session { rig, config, frames: frames.len(), mask, mask_right, tracks: tracks.is_some(), progress: bar };
+    let session = Session {
+        rig,
+        config,
+        frames,
+        masks: recording.masks.clone(),
+        tracks: recording.is_of_tracks(),
+        progress: bar,
+    };
     let mut truth_maps: Option<MapVerdict> = None;
     let outcome = session.run(
         log,
         stop,
-        |k| frames.get(k).map(|&(files, time_s)| reader.read(files, time_s, k + 1 == frames.len())),
+        |k| recording.fetch(k),
         |row| {
             let (Some(dense), Some(index)) = (&row.motion.dense, row.reference_index) else { return Ok(()) };
             if let Some(truth) = sequence.truth_maps.as_ref().filter(|t| t.index == index && !args.reverse) {
@@ -87,10 +78,10 @@ pub fn run_sequence(
     let mut summary = Summary::new(args.source.display().to_string(), rig, config, &outcome);
     summary.truth_maps = truth_maps;
     (summary.options, summary.cameras) = (Some(serde_json::to_value(args)?), cameras);
-    let eyes = match (&tracks, uses_depth(args, sequence)) {
-        (Some(_), _) => Eyes::Tracks,
-        (None, true) => Eyes::Depth,
-        (None, false) => Eyes::Stereo,
+    let eyes = match (recording.is_of_tracks(), recording.is_of_depth()) {
+        (true, _) => Eyes::Tracks,
+        (false, true) => Eyes::Depth,
+        (false, false) => Eyes::Stereo,
     };
     write_results(&folder, &sequence.name, eyes, &summary, &outcome)?;
     let first_failure = first_failure(&outcome.rows);
@@ -98,21 +89,19 @@ pub fn run_sequence(
         Some(log) if outcome.complete => log.remove()?,
         Some(_) => terminal::tell(format_args!(
             "stopped after {} of {} frames; the same command with --resume goes on",
-            summary.frames,
-            frames.len()
+            summary.frames, frames
         )),
         None => {}
     }
     Ok(Some(DoneSequence { summary, first_failure }))
 }
 
-/// Tracks are sparse, whatever was asked for.
-fn suited(args: &RunArgs, config: &Config, tracks: bool) -> Result<Config> {
-    let observe = if tracks { Observe::Sparse } else { config.observe };
-    let config = Config { observe, ..config.clone() };
+/// The settings as they apply to a recording, where they fit together.
+fn suited(args: &RunArgs, config: &Config, recording: &Recording) -> Result<Config> {
+    let config = recording.config(config);
     config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
-    if tracks && (args.map_files().any() || args.disparity.is_some() || args.flow.is_some()) {
-        return Err(Usage("--maps, --disparity and --flow need images, not tracks".into()).into());
+    if recording.is_of_tracks() && args.map_files().any() {
+        return Err(Usage("--maps need images, not tracks".into()).into());
     }
     Ok(config)
 }
@@ -147,28 +136,6 @@ fn first_failure(rows: &[Row]) -> Option<String> {
     failures.filter(|why| **why != Unanswered::First).map(ToString::to_string).next()
 }
 
-/// The sensor that is asked for must be there.
-fn check_sensor(args: &RunArgs, sequence: &Sequence) -> Result<()> {
-    let (has, wanted) = match args.sensor {
-        Some(SensorArg::Depth) => (sequence.depth_sensor.is_some(), "depth images"),
-        Some(SensorArg::Stereo) => (has_right(sequence), "right images"),
-        None => return Ok(()),
-    };
-    if has { Ok(()) } else { Err(Usage(format!("{}: has no {wanted}", args.source.display())).into()) }
-}
-
-/// Whether depth images take the place of right ones: where there are no others, or as the user says.
-fn uses_depth(args: &RunArgs, sequence: &Sequence) -> bool {
-    match args.sensor {
-        Some(sensor) => sensor == SensorArg::Depth,
-        None => !has_right(sequence),
-    }
-}
-
-fn has_right(sequence: &Sequence) -> bool {
-    sequence.side_by_side || sequence.frames.iter().any(|frame| frame.right.is_some())
-}
-
 /// What the report should say besides.
 fn notes(summary: &Summary) -> Vec<String> {
     let mut notes = Vec::new();
@@ -180,50 +147,4 @@ fn notes(summary: &Summary) -> Vec<String> {
     }
     notes.extend(summary.warnings.iter().cloned());
     notes
-}
-
-/// The frames to use with their times, which increase also when playing backwards.
-fn select<'a>(args: &RunArgs, sequence: &'a Sequence) -> Result<Vec<(&'a FrameFiles, f64)>> {
-    let all = &sequence.frames;
-    let name = args.source.display();
-    if all.len() == 1 {
-        bail!("{name}: has one frame only; motion needs at least two");
-    }
-    if args.start >= all.len() {
-        return Err(Usage(format!("--start {} is past the last of {} frames", args.start, all.len())).into());
-    }
-    let chosen = all[args.start..].iter().step_by(args.stride).take(args.frames.unwrap_or(usize::MAX));
-    let mut frames: Vec<(&FrameFiles, f64)> = chosen.map(|frame| (frame, frame.time_s)).collect();
-    if frames.len() < 2 {
-        return Err(Usage(format!("{} frame is selected; motion needs at least two", frames.len())).into());
-    }
-    if args.reverse {
-        frames.reverse();
-        let last = frames[0].1;
-        frames.iter_mut().for_each(|(_, time)| *time = last - *time);
-    }
-    Ok(frames)
-}
-
-fn read_mask(path: &Path, rig: &StereoRig) -> Result<Grid<bool>> {
-    let mask = image::read(path)?;
-    let ((w, h), (we, he)) = (mask.size(), (rig.width_px, rig.height_px));
-    if (w, h) != (we, he) {
-        bail!(
-            "{}: the mask is {w}x{h} pixels, the images {we}x{he}; give one of the images' size",
-            path.display()
-        );
-    }
-    Ok(Grid::from_fn(w, h, |u, v| mask.at(u, v) > 0.0))
-}
-
-/// Pixels that either mask excludes.
-fn joined(mask: Option<Grid<bool>>, unseen: Option<Grid<bool>>) -> Option<Grid<bool>> {
-    match (mask, unseen) {
-        (Some(mut mask), Some(unseen)) => {
-            mask.values_mut().iter_mut().zip(unseen.values()).for_each(|(masked, unseen)| *masked |= unseen);
-            Some(mask)
-        }
-        (mask, unseen) => mask.or(unseen),
-    }
 }

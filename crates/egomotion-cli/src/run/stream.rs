@@ -10,11 +10,11 @@ use egomotion::observe::{RectificationMap, Rectifier};
 use egomotion::pipeline::{Config, Frame, StereoFrame, Unanswered};
 use egomotion_io::IoError;
 use egomotion_io::calibration::{self, CameraPair};
+use egomotion_io::recording::{Fetched, Given, halves, unseen};
 use egomotion_io::stream::{ImageStream, Kind};
 use serde_json::{Value, json};
 
 use crate::args::RunArgs;
-use crate::feed::{Fetched, Given, halves, unseen};
 use crate::report::Eyes;
 use crate::results::{About, ResultFolder, motion_row};
 use crate::session::{Row, Session, progress, stop_signal};
@@ -47,9 +47,9 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
     let maps = args.map_files();
     maps.folders(&out)?;
     // Progress would stand between the lines of whoever looks at both.
-    let [mask, mask_right] = unseen(rectifier.as_ref());
+    let masks = unseen(rectifier.as_ref());
     let session =
-        Session { rig: pair.rig, config, frames: 0, mask, mask_right, tracks: false, progress: progress(0, true) };
+        Session { rig: pair.rig, config, frames: 0, masks, tracks: false, progress: progress(0, true) };
     let stop = stop_signal("frame");
     let source = Mutex::new((Some(first), pairs));
     let fetch = |k: usize| {

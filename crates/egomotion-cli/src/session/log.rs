@@ -5,10 +5,10 @@
 
 use anyhow::Result;
 use egomotion::geometry::RigidMotion;
+use egomotion_io::recording::Memory;
 use serde::{Deserialize, Serialize};
 
 use super::Row;
-use super::pipeline::Memory;
 use crate::journal::{Journal, Parts};
 use crate::report::FramePictures;
 

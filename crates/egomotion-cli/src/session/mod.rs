@@ -1,7 +1,6 @@
 //! One sequence through the pipeline: the loop that `run` and `demo` share.
 
 mod log;
-mod pipeline;
 mod tally;
 mod work;
 
@@ -11,10 +10,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Result;
 use egomotion::geometry::{Grid, RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::{Config, FrameMotion, Trajectory, Unanswered};
+use egomotion_io::recording::{Fetched, with_frames};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
-use crate::feed::{Fetched, with_frames};
 use crate::report::Album;
 use crate::terminal::tell;
 pub use log::Log;
@@ -26,10 +25,8 @@ pub struct Session<'a> {
     pub config: &'a Config,
     /// Number of frames, as far as it is known.
     pub frames: usize,
-    /// Pixels of the left image never to use.
-    pub mask: Option<Grid<bool>>,
-    /// The same of the right image.
-    pub mask_right: Option<Grid<bool>>,
+    /// Pixels of the left and of the right image never to use.
+    pub masks: [Option<Grid<bool>>; 2],
     /// Frames are tracks, not images.
     pub tracks: bool,
     pub progress: ProgressBar,

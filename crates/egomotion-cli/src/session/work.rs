@@ -2,15 +2,15 @@
 
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use egomotion::geometry::{Image, RigidMotion, Twist};
 use egomotion::pipeline::{FrameMotion, Observe, Trajectory};
+use egomotion_io::recording::{Fetched, Given, Pipeline};
 
 use super::log::{DoneFrame, Log, Picture};
-use super::pipeline::Pipeline;
 use super::tally::Tally;
 use super::{Outcome, Row, Session};
-use crate::feed::{Fetched, Given};
+use crate::journal::ANEW;
 use crate::report::{Album, FramePictures};
 
 pub struct Work<'a> {
@@ -33,7 +33,12 @@ impl<'a> Work<'a> {
     pub fn new(session: &'a Session<'a>) -> Result<Self> {
         Ok(Self {
             session,
-            pipeline: Pipeline::new(session)?,
+            pipeline: Pipeline::new(
+                session.rig,
+                session.config.clone(),
+                session.tracks,
+                session.masks.clone(),
+            )?,
             rows: Vec::new(),
             trajectory: Trajectory::new(),
             truths: Vec::new(),
@@ -56,7 +61,8 @@ impl<'a> Work<'a> {
         let past = log.take_past();
         if let Some(last) = past.last() {
             (self.earlier_ms, self.tally.aside_ms) = (last.wall_ms, last.aside_ms);
-            let left = self.pipeline.recall(last.memory.clone(), fetch)?;
+            let recalled = self.pipeline.recall(last.memory.clone(), fetch);
+            let left = recalled.map_err(|why| anyhow!("{why}; {ANEW}"))?;
             self.reference = self.pipeline.reference().zip(left);
         }
         for DoneFrame { row, pose, decode_ms, picture, .. } in past.into_iter().flat_map(|s| s.frames) {

@@ -9,12 +9,12 @@ use egomotion::sim::StereoImages;
 use egomotion::study::real::recording::{Measuring, Triple, publish};
 use egomotion::study::real::{Draw, LabStudy, RealError, Record};
 use egomotion::study::{Publication, Study};
+use egomotion_io::recording::Reader;
 use egomotion_io::source::{FrameFiles, Source};
 use serde::Serialize;
 
 use super::alone;
 use super::args::RealArgs;
-use crate::feed::Reader;
 use crate::{Ending, Usage};
 
 /// Pixels between two observations of φ in a recording.
@@ -55,7 +55,7 @@ struct RecordingStudy {
     #[serde(skip)]
     frames: Vec<(FrameFiles, RigidMotion)>,
     #[serde(skip)]
-    reader: Reader<'static>,
+    reader: Reader,
 }
 
 impl RecordingStudy {

@@ -20,7 +20,8 @@ fn karlsruhe() -> Copy {
             (east_north_up(&pose.translation), east_north_up(&pose.rotation.column(2).into_owned()));
         let yaw = ahead[1].atan2(ahead[0]);
         let stamp = 1_268_139_655_398_043_392_u64 + 100_000_000 * k as u64;
-        rows += &format!("{stamp} 49.0 8.3 114.2 {:?} {:?} {z:?} 0.01 2.09 {yaw:?} \n", x - 5311.3, y - 1023.6);
+        rows +=
+            &format!("{stamp} 49.0 8.3 114.2 {:?} {:?} {z:?} 0.01 2.09 {yaw:?} \n", x - 5311.3, y - 1023.6);
     }
     fs::write(copy.file("insdata.txt"), rows).unwrap();
     fs::remove_file(copy.file("poses.txt")).unwrap();
@@ -51,7 +52,8 @@ fn a_bad_row_is_named() {
         assert_refused(&try_run(&copy.source(), &copy.out(), ""), 1, parts);
     };
     refused(good.replacen("114.2", "nowhere", 1), &["insdata.txt:1", "\"nowhere\" is not a number"]);
-    let cut: Vec<&str> = good.lines().enumerate().map(|(k, row)| if k == 2 { &row[..40] } else { row }).collect();
+    let cut: Vec<&str> =
+        good.lines().enumerate().map(|(k, row)| if k == 2 { &row[..40] } else { row }).collect();
     refused(cut.join("\n"), &["insdata.txt:3", "numbers, not 10"]);
     // Fewer rows than images: these frames have no truth, and the run goes on.
     fs::write(&file, good.lines().take(2).collect::<Vec<_>>().join("\n")).unwrap();

@@ -1,32 +1,45 @@
 //! What turns frames into motion: images or tracks.
 
-use anyhow::{Result, anyhow};
-use egomotion::geometry::Image;
-use egomotion::pipeline::{FrameMotion, StereoMemory, StereoMotion, TrackMemory, TrackMotion, Unanswered};
+use egomotion::geometry::{Grid, Image, StereoRig};
+use egomotion::pipeline::stereo::PipelineError;
+use egomotion::pipeline::{
+    Config, FrameMotion, StereoMemory, StereoMotion, TrackMemory, TrackMotion, Unanswered,
+};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
-use super::Session;
-use crate::feed::{Fetched, Given};
-use crate::journal::ANEW;
+use super::{Fetched, Given};
 
 /// What turns frames of either kind into motion.
+#[derive(Debug)]
 pub enum Pipeline {
+    /// Images.
     Images(Box<StereoMotion>),
+    /// Tracks.
     Tracks(Box<TrackMotion>),
 }
 
 impl Pipeline {
-    pub fn new(session: &Session<'_>) -> Result<Self> {
-        let config = session.config.clone();
-        if session.tracks {
-            return Ok(Self::Tracks(Box::new(TrackMotion::new(session.rig, config)?)));
+    /// For images of a rig with the `masks` of left and right, or for `tracks`.
+    ///
+    /// # Errors
+    /// The rig cannot measure, or the settings do not fit together.
+    pub fn new(
+        rig: StereoRig,
+        config: Config,
+        tracks: bool,
+        [left, right]: [Option<Grid<bool>>; 2],
+    ) -> Result<Self, PipelineError> {
+        if tracks {
+            return Ok(Self::Tracks(Box::new(TrackMotion::new(rig, config)?)));
         }
-        let mut images = StereoMotion::new(session.rig, config)?;
-        images.set_mask(session.mask.clone());
-        images.set_right_mask(session.mask_right.clone());
+        let mut images = StereoMotion::new(rig, config)?;
+        images.set_mask(left);
+        images.set_right_mask(right);
         Ok(Self::Images(Box::new(images)))
     }
 
+    /// The motion from the last good frame to what is given of this time.
     pub fn push(&mut self, time_s: f64, given: Result<Given, Unanswered>) -> FrameMotion {
         match (self, given) {
             (Self::Images(images), Ok(Given::Frame(frame))) => images.push(*frame),
@@ -36,6 +49,7 @@ impl Pipeline {
         }
     }
 
+    /// The frame that the next one will be matched with, counted over all frames pushed.
     pub fn reference(&self) -> Option<usize> {
         match self {
             Self::Images(images) => images.reference(),
@@ -47,7 +61,9 @@ impl Pipeline {
 /// What a pipeline keeps of the frames that it has seen.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum Memory {
+    /// Of images.
     Images(StereoMemory),
+    /// Of tracks.
     Tracks(TrackMemory),
 }
 
@@ -61,11 +77,14 @@ impl Pipeline {
     }
 
     /// Go on from a memory; the reference frame is fetched again, and its left image given back.
+    ///
+    /// # Errors
+    /// The memory is not of such frames, or the reference frame cannot be read again.
     pub fn recall(
         &mut self,
         memory: Memory,
         fetch: impl FnOnce(usize) -> Option<Fetched>,
-    ) -> Result<Option<Image>> {
+    ) -> Result<Option<Image>, RecallError> {
         match (self, memory) {
             (Self::Images(images), Memory::Images(memory)) => {
                 let mut left = None;
@@ -78,18 +97,34 @@ impl Pipeline {
                     Some(given) => Err(reason(given)),
                     None => Err(Unanswered::BadImage("it is no longer there".into())),
                 };
-                images.recall(memory, again).map_err(|why| {
-                    anyhow!("frame {reference} of the run, with which the next one is to be matched, cannot be read again: {why}; {ANEW}")
-                })?;
+                images.recall(memory, again).map_err(|why| RecallError::Frame { reference, why })?;
                 Ok(left)
             }
             (Self::Tracks(tracks), Memory::Tracks(memory)) => {
                 tracks.recall(memory);
                 Ok(None)
             }
-            _ => Err(anyhow!("the run was begun with frames of another kind; {ANEW}")),
+            _ => Err(RecallError::Kind),
         }
     }
+}
+
+/// Why a pipeline cannot go on from a memory.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum RecallError {
+    /// The frame that the next one is to be matched with is no longer what it was.
+    #[error(
+        "frame {reference} of the run, with which the next one is to be matched, cannot be read again: {why}"
+    )]
+    Frame {
+        /// Its number, counted over all frames.
+        reference: usize,
+        /// What is wrong with it.
+        why: Unanswered,
+    },
+    /// Tracks are no images.
+    #[error("the run was begun with frames of another kind")]
+    Kind,
 }
 
 /// Why nothing can be pushed.

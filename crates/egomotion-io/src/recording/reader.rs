@@ -6,15 +6,15 @@ use std::time::Instant;
 use egomotion::geometry::{Field, Grid, Image};
 use egomotion::observe::{DisparityMap, FlowField, RectificationMap, Rectifier};
 use egomotion::pipeline::{DepthCamera, Frame, Unanswered};
-use egomotion_io::source::{DepthSensor, FrameFiles, Sequence};
-use egomotion_io::tracks::TrackTable;
-use egomotion_io::{IoError, depth, given, image, pfm, undistort};
 
 use super::{Fetched, Given};
+use crate::source::{DepthSensor, FrameFiles, Sequence};
+use crate::tracks::TrackTable;
+use crate::{IoError, depth, given, image, pfm, undistort};
 
 /// Where the parts of a frame come from.
 #[derive(Debug, Default)]
-pub struct Reader<'a> {
+pub struct Reader {
     /// Turns raw images into rectified ones.
     pub rectifier: Option<Rectifier>,
     /// Takes disparity from depth images in place of the right ones.
@@ -22,17 +22,14 @@ pub struct Reader<'a> {
     /// Each file holds both images.
     pub side_by_side: bool,
     /// Folder of disparity maps that take the place of our own.
-    pub disparity: Option<&'a Path>,
+    pub disparity: Option<PathBuf>,
     /// Folder of flow maps that take the place of our own.
-    pub flow: Option<&'a Path>,
+    pub flow: Option<PathBuf>,
     /// Tracks that take the place of images.
-    pub tracks: Option<&'a TrackTable>,
+    pub tracks: Option<TrackTable>,
 }
 
-/// Standard deviation of a given disparity or flow that comes without one, in pixels.
-const GIVEN_SIGMA_PX: f32 = 0.3;
-
-impl Reader<'_> {
+impl Reader {
     /// Compute what the frames of a sequence need; with `depth` its depth images take the place of right ones.
     pub fn new(sequence: &Sequence, depth: bool) -> Self {
         let sensor = sequence.depth_sensor.filter(|_| depth);
@@ -55,7 +52,7 @@ impl Reader<'_> {
     /// Read one frame; what cannot be read becomes the frame's status. The `last` frame has no flow.
     pub fn read(&self, files: &FrameFiles, time_s: f64, last: bool) -> Fetched {
         let start = Instant::now();
-        let frame = match self.tracks {
+        let frame = match &self.tracks {
             Some(table) => Ok(Given::Tracks(table.frames.get(&files.index).cloned().unwrap_or_default())),
             None => self.frame(files, time_s, last).map(|frame| Given::Frame(Box::new(frame))),
         };
@@ -71,16 +68,18 @@ impl Reader<'_> {
 
     /// Size of all files of a frame together.
     pub fn bytes(&self, files: &FrameFiles) -> u64 {
-        let given = [(self.disparity, given::DISPARITY), (self.flow, given::FLOW)];
-        let given = given.map(|(folder, endings)| given::find(folder?, &files.left, files.index, endings));
+        let given = [(&self.disparity, given::DISPARITY), (&self.flow, given::FLOW)];
+        let given =
+            given.map(|(folder, endings)| given::find(folder.as_deref()?, &files.left, files.index, endings));
         let own = [Some(&files.left), files.right.as_ref(), files.depth.as_ref()];
         let all = own.into_iter().flatten().chain(given.iter().flatten());
         all.filter_map(|file| file.metadata().ok()).map(|about| about.len()).sum()
     }
 
     fn frame(&self, files: &FrameFiles, time_s: f64, last: bool) -> Result<Frame, Unanswered> {
-        let given = self.disparity.map(|folder| given_disparity(folder, files)).transpose()?;
-        let flow = self.flow.filter(|_| !last).map(|folder| given_flow(folder, files)).transpose()?;
+        let given = self.disparity.as_deref().map(|folder| given_disparity(folder, files)).transpose()?;
+        let flow =
+            self.flow.as_deref().filter(|_| !last).map(|folder| given_flow(folder, files)).transpose()?;
         if let Some((camera, sensor)) = &self.depth {
             let file = files.depth.as_ref().ok_or(Unanswered::MissingDepth)?;
             let left = image::read(&files.left).map_err(bad)?;
@@ -175,7 +174,7 @@ fn given_disparity(folder: &Path, files: &FrameFiles) -> Result<DisparityMap, Un
         sigma_folder(folder).and_then(|folder| given::find(&folder, &files.left, files.index, &["pfm"]));
     Ok(match sigma {
         Some(sigma) => DisparityMap { shift, sigma: pfm::read(&sigma).map_err(bad)? },
-        None => DisparityMap::given(shift, |_| GIVEN_SIGMA_PX),
+        None => DisparityMap::given(shift, |_| given::SIGMA_PX),
     })
 }
 
@@ -191,7 +190,7 @@ fn given_flow(folder: &Path, files: &FrameFiles) -> Result<FlowField, Unanswered
     let (width, height) = u.size();
     let both =
         |value: f32| Grid::from_fn(width, height, |x, y| if known(&u, &v, x, y) { value } else { f32::NAN });
-    let variance = GIVEN_SIGMA_PX * GIVEN_SIGMA_PX;
+    let variance = given::SIGMA_PX * given::SIGMA_PX;
     Ok(FlowField { cov_uu: both(variance), cov_uv: both(0.0), cov_vv: both(variance), u, v })
 }
 

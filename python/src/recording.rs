@@ -1,0 +1,184 @@
+//! Recordings from their files.
+
+use std::path::PathBuf;
+use std::sync::mpsc::Receiver;
+use std::sync::{Arc, Mutex};
+
+use egomotion::pipeline::Trajectory;
+use egomotion_io::Source;
+use egomotion_io::recording::{Choice, Fetched, Pipeline, Recording, Sensor, read_ahead};
+use egomotion_io::source::Sequence;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::config::{Threads, config};
+use crate::error;
+use crate::frame_motion::FrameMotion;
+use crate::rig::Rig;
+
+/// Names of the sequences that a recording holds: one, or the scenes of a set.
+#[pyfunction]
+#[pyo3(signature = (path, *, calibration = None))]
+pub fn sequences(py: Python<'_>, path: PathBuf, calibration: Option<PathBuf>) -> PyResult<Vec<String>> {
+    let source = py.detach(|| Source::open_with(&path, calibration.as_deref())).map_err(error::read)?;
+    Ok(source.sequences.into_iter().map(|sequence| sequence.name).collect())
+}
+
+/// The motion of a recording, frame by frame: an iterator of `FrameMotion`, read ahead on a thread of its own.
+///
+/// `path` is what `egomotion run` takes; of a set of scenes `sequence` names one of `sequences(path)`. `sensor` is "stereo"
+/// or "depth"; `disparity` and `flow` are folders of maps, `tracks` a file, `mask` an image. Other keywords are the settings
+/// of `default_config()`.
+#[pyfunction]
+#[pyo3(signature = (
+    path, *, sequence = None, calibration = None, start = 0, frames = None, stride = 1, reverse = false, sensor = None,
+    disparity = None, flow = None, tracks = None, mask = None, threads = None, **settings
+))]
+#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+pub fn run(
+    py: Python<'_>,
+    path: PathBuf,
+    sequence: Option<&str>,
+    calibration: Option<PathBuf>,
+    start: usize,
+    frames: Option<usize>,
+    stride: usize,
+    reverse: bool,
+    sensor: Option<&str>,
+    disparity: Option<PathBuf>,
+    flow: Option<PathBuf>,
+    tracks: Option<PathBuf>,
+    mask: Option<PathBuf>,
+    threads: Option<usize>,
+    settings: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Run> {
+    let sensor = match sensor {
+        None => None,
+        Some("stereo") => Some(Sensor::Stereo),
+        Some("depth") => Some(Sensor::Depth),
+        Some(other) => {
+            return Err(PyValueError::new_err(format!(
+                "sensor {other:?} is not known; give 'stereo' or 'depth'"
+            )));
+        }
+    };
+    if stride == 0 {
+        return Err(PyValueError::new_err("stride is 0; give at least 1"));
+    }
+    let choice =
+        Choice { start, frames, stride: Some(stride), reverse, sensor, disparity, flow, tracks, mask };
+    let (config, threads) = (config(py, settings)?, Threads::new(threads)?);
+    let (name, recording) = py.detach(|| -> PyResult<_> {
+        let source = Source::open_with(&path, calibration.as_deref()).map_err(error::read)?;
+        let found = named(source, sequence)?;
+        Ok((found.name.clone(), Recording::open(&path, &found, &choice).map_err(error::choice)?))
+    })?;
+    let pipeline = recording.pipeline(&config).map_err(error::value)?;
+    let recording = Arc::new(recording);
+    Ok(Run {
+        name,
+        fetched: Mutex::new(read_ahead(Arc::clone(&recording))),
+        recording,
+        pipeline,
+        trajectory: Trajectory::new(),
+        threads,
+    })
+}
+
+/// The sequence of that name, or the only one.
+fn named(source: Source, name: Option<&str>) -> PyResult<Sequence> {
+    let names =
+        || source.sequences.iter().map(|sequence| sequence.name.as_str()).collect::<Vec<_>>().join(", ");
+    let place = match name {
+        Some(name) => {
+            source.sequences.iter().position(|sequence| sequence.name == name).ok_or_else(|| {
+                PyValueError::new_err(format!(
+                    "{}: no sequence {name:?}; there are {}",
+                    source.path.display(),
+                    names()
+                ))
+            })?
+        }
+        None if source.sequences.len() == 1 => 0,
+        None => {
+            let words =
+                format!("{}: holds several sequences; name one of {}", source.path.display(), names());
+            return Err(PyValueError::new_err(words));
+        }
+    };
+    source.sequences.into_iter().nth(place).ok_or_else(|| PyValueError::new_err("no sequence"))
+}
+
+/// A recording on its way through the pipeline: an iterator of `FrameMotion`.
+#[pyclass(module = "egomotion")]
+pub struct Run {
+    name: String,
+    recording: Arc<Recording>,
+    fetched: Mutex<Receiver<Fetched>>,
+    pipeline: Pipeline,
+    trajectory: Trajectory,
+    threads: Threads,
+}
+
+#[pymethods]
+impl Run {
+    /// Name of the sequence.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The rig on whose pixels the maps lie.
+    #[getter]
+    fn rig(&self) -> Rig {
+        Rig(self.recording.rig)
+    }
+
+    fn __len__(&self) -> usize {
+        self.recording.len()
+    }
+
+    fn __iter__(this: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        this
+    }
+
+    fn __next__(&mut self, py: Python<'_>) -> PyResult<Option<FrameMotion>> {
+        let Self { fetched, pipeline, threads, .. } = self;
+        let pushed = threads.run(py, || {
+            let Fetched { index, time_s, frame, truth, .. } = fetched.get_mut().ok()?.recv().ok()?;
+            Some((index, truth, pipeline.push(time_s, frame)))
+        });
+        let Some((index, truth, answer)) = pushed else { return Ok(None) };
+        self.trajectory.push(&answer);
+        // Where there is no answer the pose follows from the next one.
+        let pose =
+            self.trajectory.poses().last().copied().filter(|_| answer.motion.is_ok() || answer.frame == 0);
+        Ok(Some(FrameMotion::of(answer).placed(index, pose, truth)))
+    }
+
+    /// Poses world_from_camera of the frames so far as (n, 4, 4), the first the identity; where frames gave no answer
+    /// they are interpolated.
+    #[getter]
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, numpy::PyArray3<f64>>> {
+        crate::arrays::stack(
+            py,
+            self.trajectory.poses().iter().map(|pose| {
+                let mut matrix = nalgebra::Matrix4::identity();
+                matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&pose.rotation);
+                matrix.fixed_view_mut::<3, 1>(0, 3).copy_from(&pose.translation);
+                matrix
+            }),
+        )
+    }
+
+    /// Their times (n,) in seconds.
+    #[getter]
+    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, numpy::PyArray1<f64>> {
+        numpy::PyArray1::from_slice(py, self.trajectory.times_s())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Run({:?}, {} frames)", self.name, self.recording.len())
+    }
+}
