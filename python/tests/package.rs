@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// What the tests need besides the wheel's own dependencies.
-const NEEDED: [&str; 5] = ["maturin>=1.9,<2", "numpy", "pytest>=8", "hypothesis>=6", "mypy>=1.11"];
+const NEEDED: [&str; 7] =
+    ["maturin>=1.9,<2", "numpy", "pytest>=8", "hypothesis>=6", "mypy>=1.11", "pandas>=2", "pyarrow>=14"];
 
 #[test]
 fn the_wheel_passes_its_tests() {
@@ -42,14 +43,23 @@ fn the_wheel_passes_its_tests() {
     // From a folder of its own, so that nothing but the wheel can be imported.
     let tests = here.join("tests");
     passes(&own, |command| {
+        if let Some(built) = command_of_the_workspace() {
+            command.env("EGOMOTION_COMMAND", built);
+        }
         command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]).arg(&tests).current_dir(folder.path());
     });
     passes(&own, |command| {
-        command.args(["-m", "mypy", "--strict"]).arg(&tests).current_dir(folder.path());
+        command.args(["-m", "mypy", "--config-file"]).arg(here.join("pyproject.toml")).arg(&tests).current_dir(folder.path());
     });
     passes(&own, |command| {
         command.args(["-m", "mypy.stubtest", "egomotion"]).current_dir(folder.path());
     });
+}
+
+/// The command `egomotion`, which the tests of the whole workspace build; its answers are compared.
+fn command_of_the_workspace() -> Option<PathBuf> {
+    let beside = std::env::current_exe().ok()?.parent()?.parent()?.join("egomotion");
+    Some(beside.with_extension(std::env::consts::EXE_EXTENSION)).filter(|path| path.is_file())
 }
 
 /// A Python that is new enough.
