@@ -5,6 +5,8 @@ Lengths are metres, angles radians, image coordinates pixels, times seconds. Cov
 them; a value that is not known is NaN, one that is not determined has an infinite variance.
 """
 
+from importlib.metadata import version as _version
+
 from ._native import (
     DepthChanges,
     DepthFlows,
@@ -55,7 +57,10 @@ from ._native import (
     velocity,
 )
 
+__version__ = _version("egomotion")
+
 __all__ = [
+    "__version__",
     "DepthChanges",
     "DepthFlows",
     "DepthTracks",

@@ -54,18 +54,25 @@ def row(answer: FrameMotion) -> dict[str, float | int | str | None]:
 
 
 def columns(answers: Iterable[FrameMotion]) -> dict[str, list[float | int | str | None]]:
-    """All rows, column by column; one row for each frame from the second on, as in `motion.csv`."""
-    rows = [row(answer) for answer in answers if answer.status != "first"]
+    """All rows, column by column; as in `motion.csv` a first answer that has nothing before it has no row."""
+    rows = [row(answer) for k, answer in enumerate(answers) if k > 0 or answer.dt is not None]
     return {name: [values[name] for values in rows] for name in COLUMNS}
+
+
+def arrow_schema() -> pyarrow.Schema:
+    """Names and types of the columns of `motion.csv`."""
+    import pyarrow as pa
+
+    kinds = dict.fromkeys(COLUMNS, pa.float64())
+    kinds.update(frame=pa.int64(), rows=pa.int64(), inliers=pa.int64(), observed=pa.string(), status=pa.string())
+    return pa.schema(list(kinds.items()))
 
 
 def to_arrow(answers: Iterable[FrameMotion]) -> pyarrow.Table:
     """An Arrow table with the columns of `motion.csv`, typed, null where a value is not known."""
     import pyarrow as pa
 
-    kinds = dict.fromkeys(COLUMNS, pa.float64())
-    kinds.update(frame=pa.int64(), rows=pa.int64(), inliers=pa.int64(), observed=pa.string(), status=pa.string())
-    return pa.table(columns(answers), schema=pa.schema(list(kinds.items())))
+    return pa.table(columns(answers), schema=arrow_schema())
 
 
 def to_pandas(answers: Iterable[FrameMotion]) -> pandas.DataFrame:
