@@ -17,9 +17,12 @@ mod outputs;
 mod process;
 mod raw;
 mod recording;
+mod resume;
 mod selection;
 mod settings;
 mod simulate;
 mod sources;
+#[cfg(unix)]
+mod stalled;
 mod study;
 mod table;
