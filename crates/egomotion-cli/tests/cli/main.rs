@@ -14,6 +14,7 @@ mod info;
 mod interrupt;
 mod maps;
 mod outputs;
+mod parquet;
 mod process;
 mod raw;
 mod recording;
