@@ -64,7 +64,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
             Ok(())
         },
     )?;
-    folder.write_motion(&config, &outcome)?;
+    folder.write_motion(&config, &outcome, false)?;
     let mut summary = Summary::new("demo".into(), sequence.rig, &config, &outcome);
     summary.truth_maps = verdicts.vz.verdict();
     folder.write_json("summary.json", &summary)?;

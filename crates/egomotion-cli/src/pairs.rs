@@ -11,7 +11,7 @@ use egomotion::geometry::{Field, StereoRig};
 use egomotion::metrics::quantile;
 use egomotion::observe::{DisparityMap, DisparityMatcher};
 use egomotion::pipeline::Config;
-use egomotion_io::motion_table::{self, MotionRow};
+use egomotion_io::motion_table::MotionRow;
 use egomotion_io::recording::Reader;
 use egomotion_io::source::{Sequence, Source};
 use serde::{Deserialize, Serialize};
@@ -167,7 +167,7 @@ fn matched(args: &RunArgs, config: &Config, pair: &Sequence, out: &Path) -> Resu
         impact_s: None,
         status: NO_MOTION.into(),
     };
-    folder.write("motion.csv", motion_table::text(&[row]).as_bytes())?;
+    folder.write_rows(&[row], args.parquet)?;
     let summary = PairSummary {
         stages_ms: [("decode".into(), decode_ms), ("disparity".into(), disparity_ms)].into(),
         frame_ms: decode_ms + disparity_ms,

@@ -54,7 +54,8 @@ impl ResultFolder {
     }
 
     /// Write the trajectory in all formats, `motion.csv`, and where every pixel was seen `moving.csv`.
-    pub fn write_motion(&self, config: &Config, outcome: &Outcome) -> Result<()> {
+    /// With `parquet` that too.
+    pub fn write_motion(&self, config: &Config, outcome: &Outcome, parquet: bool) -> Result<()> {
         let times = outcome.trajectory.times_s();
         let poses: Vec<Pose> = outcome
             .trajectory
@@ -71,7 +72,20 @@ impl ResultFolder {
         }
         // The first frame has no motion.
         let rows: Vec<MotionRow> = outcome.rows.iter().skip(1).map(motion_row).collect();
-        Ok(motion_table::write(&self.path.join("motion.csv"), &rows)?)
+        self.write_rows(&rows, parquet)
+    }
+
+    /// Write `motion.csv`, and with `parquet` the same as `motion.parquet`.
+    pub fn write_rows(&self, rows: &[MotionRow], parquet: bool) -> Result<()> {
+        motion_table::write(&self.path.join("motion.csv"), rows)?;
+        #[cfg(feature = "parquet")]
+        if parquet {
+            egomotion_io::motion_parquet::write(&self.path.join("motion.parquet"), rows)?;
+        }
+        // Without the feature the option is refused before anything is done.
+        #[cfg(not(feature = "parquet"))]
+        let _ = parquet;
+        Ok(())
     }
 }
 

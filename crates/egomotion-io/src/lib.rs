@@ -25,6 +25,8 @@ pub mod flo;
 pub mod flow_png;
 pub mod given;
 pub mod image;
+#[cfg(feature = "parquet")]
+pub mod motion_parquet;
 pub mod motion_table;
 pub mod npy;
 pub mod npz;

@@ -43,6 +43,11 @@ impl Motion {
     pub fn is_complete(&self) -> bool {
         self.observed == [true; 6]
     }
+
+    /// The column `observed`: of each component 1 or 0.
+    pub fn observed_word(&self) -> String {
+        self.observed.map(|observed| if observed { '1' } else { '0' }).iter().collect()
+    }
 }
 
 /// Columns before and after those of the covariance.
@@ -54,7 +59,7 @@ const COLUMNS: usize = FIRST.len() + 21 + LAST.len();
 const ADVICE: &str = "give a motion.csv as `egomotion run` writes it";
 
 /// The upper triangle of the covariance, row by row.
-fn upper_triangle() -> impl Iterator<Item = (usize, usize)> {
+pub(crate) fn upper_triangle() -> impl Iterator<Item = (usize, usize)> {
     (0..6).flat_map(|i| (i..6).map(move |j| (i, j)))
 }
 
@@ -91,7 +96,7 @@ fn record(row: &MotionRow) -> Vec<String> {
             record.extend((0..6).map(shown));
             record.extend(upper_triangle().map(|(i, j)| number(motion.phi.cov[(i, j)])));
             record.extend([motion.rows.to_string(), motion.inliers.to_string()]);
-            record.push(motion.observed.map(|o| if o { '1' } else { '0' }).iter().collect());
+            record.push(motion.observed_word());
         }
         None => record.extend(std::iter::repeat_n(String::new(), 6 + 21 + 3)),
     }

@@ -90,6 +90,9 @@ pub struct RunArgs {
     /// Write every frame as a cloud of points (PLY) in the colours of a quantity.
     #[arg(long, value_enum, value_name = "QUANTITY")]
     pub cloud: Option<CloudArg>,
+    /// Write motion.parquet too, motion.csv for data frames; needs a build with the feature parquet.
+    #[arg(long)]
+    pub parquet: bool,
     /// Settings as TOML; options given here come before those in the file.
     #[arg(long, value_name = "FILE")]
     #[serde(skip)]

@@ -23,6 +23,10 @@ use sequence::{DoneSequence, run_sequence};
 /// Run a source, be it one sequence or a set of scenes.
 pub fn run(args: &RunArgs) -> Result<Ending> {
     let config = resolve_config(args)?;
+    if args.parquet && !cfg!(feature = "parquet") {
+        let reason = "--parquet is not in this build: build with `cargo install --path crates/egomotion-cli --features parquet`";
+        return Err(Usage(reason.into()).into());
+    }
     set_threads(args.threads)?;
     if args.source.as_os_str() == "-" {
         return stream::run(args, &config);

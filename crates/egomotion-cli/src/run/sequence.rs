@@ -83,7 +83,8 @@ pub fn run_sequence(
         (false, true) => Eyes::Depth,
         (false, false) => Eyes::Stereo,
     };
-    write_results(&folder, &sequence.name, eyes, &summary, &outcome)?;
+    folder.write_motion(config, &outcome, args.parquet)?;
+    write_about(&folder, &sequence.name, eyes, &summary, &outcome)?;
     let first_failure = first_failure(&outcome.rows);
     match outcome.log {
         Some(log) if outcome.complete => log.remove()?,
@@ -106,14 +107,14 @@ fn suited(args: &RunArgs, config: &Config, recording: &Recording) -> Result<Conf
     Ok(config)
 }
 
-fn write_results(
+/// Summary and report.
+fn write_about(
     folder: &ResultFolder,
     name: &str,
     eyes: Eyes,
     summary: &Summary,
     outcome: &Outcome,
 ) -> Result<()> {
-    folder.write_motion(&summary.config, outcome)?;
     for warning in &summary.warnings {
         terminal::tell(format_args!("{name}: warning: {warning}"));
     }

@@ -83,7 +83,7 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
         let (Some(dense), Some(index)) = (&row.motion.dense, row.reference_index) else { return Ok(()) };
         maps.write(&out, index, dense, &pair.rig)
     })?;
-    folder.write_motion(config, &outcome)?;
+    folder.write_motion(config, &outcome, args.parquet)?;
     let summary = Summary::new(NAME.0.into(), pair.rig, config, &outcome);
     folder.write_json("summary.json", &summary)?;
     let about = About {

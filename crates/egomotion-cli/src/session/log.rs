@@ -13,7 +13,7 @@ use crate::journal::{Journal, Parts};
 use crate::report::FramePictures;
 
 /// Longest time between two writes, in milliseconds.
-const LONGEST_MS: f64 = 5e3;
+const LONGEST_MS: f64 = 1e4;
 
 /// Frames that were done without a break in between.
 #[derive(Debug, Serialize, Deserialize)]

@@ -15,12 +15,16 @@ mod interrupt;
 mod karlsruhe;
 mod maps;
 mod outputs;
+mod parquet;
 mod process;
 mod raw;
 mod recording;
+mod resume;
 mod selection;
 mod settings;
 mod simulate;
 mod sources;
+#[cfg(unix)]
+mod stalled;
 mod study;
 mod table;
