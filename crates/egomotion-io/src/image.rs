@@ -217,7 +217,10 @@ mod tests {
             assert!((image.at(16, 8) - 168.0).abs() < 4.0 && (image.at(3, 0) - 30.0).abs() < 4.0, "{name}");
             if format != ImageFormat::Jpeg {
                 assert_eq!(image.at(16, 8), 168.0);
-                assert_eq!(decode(&encoded(wide.clone().into(), format), &path).unwrap().at(16, 8), 16008.0 / 257.0);
+                assert_eq!(
+                    decode(&encoded(wide.clone().into(), format), &path).unwrap().at(16, 8),
+                    16008.0 / 257.0
+                );
             }
             let image = decode(&encoded(colour.clone().into(), format), &path).unwrap();
             assert!((image.at(5, 5) - luma).abs() < 2.0, "{name}: {}", image.at(5, 5));

@@ -18,9 +18,8 @@ pub fn centres(plane: &Grid<f32>, most: usize) -> Grid<f64> {
 /// A plane of at most `most` columns, each pixel the mean of what is finite in the block it stands for, or 0.
 pub fn means(plane: &Grid<f32>, most: usize) -> Grid<f64> {
     let (small, rows) = reduced(plane.size(), most);
-    let blocks = |n: usize, of: usize| {
-        (0..n).map(|i| i * of / n..((i + 1) * of).div_ceil(n)).collect::<Vec<_>>()
-    };
+    let blocks =
+        |n: usize, of: usize| (0..n).map(|i| i * of / n..((i + 1) * of).div_ceil(n)).collect::<Vec<_>>();
     let (columns, lines) = (blocks(small, plane.width()), blocks(rows, plane.height()));
     Grid::from_fn(small, rows, |u, v| {
         let block = lines[v].clone().flat_map(|y| &plane.row(y)[columns[u].clone()]);

@@ -60,8 +60,15 @@ pub fn run_sequence(
     maps.folders(out)?;
     let bar = progress(frames.len(), args.quiet);
     bar.set_message(sequence.name.clone());
-    let session =
-        Session { rig, config, frames: frames.len(), mask, mask_right, tracks: tracks.is_some(), progress: bar };
+    let session = Session {
+        rig,
+        config,
+        frames: frames.len(),
+        mask,
+        mask_right,
+        tracks: tracks.is_some(),
+        progress: bar,
+    };
     let mut truth_maps: Option<MapVerdict> = None;
     let mut first_failure = None;
     let outcome = session.run(

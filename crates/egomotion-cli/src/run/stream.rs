@@ -43,8 +43,15 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
     maps.folders(&out)?;
     // Progress would stand between the lines of whoever looks at both.
     let [mask, mask_right] = unseen(rectifier.as_ref());
-    let session =
-        Session { rig: pair.rig, config, frames: 0, mask, mask_right, tracks: false, progress: progress(0, true) };
+    let session = Session {
+        rig: pair.rig,
+        config,
+        frames: 0,
+        mask,
+        mask_right,
+        tracks: false,
+        progress: progress(0, true),
+    };
     let stop = stop_signal();
     let source = Mutex::new((Some(first), pairs));
     let fetch = |k: usize| {
