@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use egomotion::geometry::Field;
+use egomotion::geometry::{Field, Grid};
 use png::{BitDepth, ColorType};
 
 use crate::raster::Raster;
@@ -33,15 +33,19 @@ pub fn decode(content: &[u8], path: &Path) -> Result<[Field; 2], IoError> {
             "give a KITTI flow map (64 v + 32768, third channel valid)",
         )
     })?;
-    let (width, height) = (raster.width, raster.height);
-    let mut flow = [Field::missing(width, height), Field::missing(width, height)];
     let samples: Vec<u16> = samples.collect();
-    for (i, pixel) in samples.chunks_exact(3).enumerate().filter(|(_, pixel)| pixel[2] > 0) {
-        for (field, &level) in flow.iter_mut().zip(pixel) {
-            field.set(i % width, i / width, Some((f32::from(level) - ZERO) / LEVELS));
-        }
-    }
-    Ok(flow)
+    let (pixels, _) = samples.as_chunks::<3>();
+    let component = |k: usize| {
+        let value = |pixel: &[u16; 3]| {
+            if pixel[2] > 0 { (f32::from(pixel[k]) - ZERO) / LEVELS } else { f32::NAN }
+        };
+        Grid::from_values(raster.width, raster.height, pixels.iter().map(value).collect())
+            .map(Field::from_grid)
+    };
+    component(0)
+        .zip(component(1))
+        .map(|(u, v)| [u, v])
+        .ok_or_else(|| IoError::new(path, "has not as many samples as pixels", "replace the file"))
 }
 
 /// Write a flow map given in pixels, rounded to 1/64 px.

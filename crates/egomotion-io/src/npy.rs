@@ -114,7 +114,7 @@ pub fn decode(content: &[u8], path: &Path) -> Result<Array, IoError> {
             count * size
         )));
     }
-    let values: Vec<f64> = values.chunks_exact(size).map(|bytes| head.kind.number(bytes)).collect();
+    let values = head.kind.numbers(values);
     let values = if head.fortran { transposed(&values, &head.shape) } else { values };
     Ok(Array { shape: head.shape, values })
 }
@@ -181,21 +181,33 @@ impl Kind {
         self.bytes
     }
 
-    /// One number from as many bytes as it has.
-    fn number(self, bytes: &[u8]) -> f64 {
-        let mut little = [0_u8; 8];
-        for (k, &byte) in bytes.iter().enumerate().take(8) {
-            little[if self.big { bytes.len() - 1 - k } else { k }] = byte;
-        }
-        let bits = u64::from_le_bytes(little);
+    /// All numbers of some bytes.
+    fn numbers(self, bytes: &[u8]) -> Vec<f64> {
+        let big = self.big;
         match (self.class, self.bytes) {
-            (b'f', 4) => f64::from(f32::from_bits(bits as u32)),
-            (b'f', _) => f64::from_bits(bits),
-            (b'u', _) => bits as f64,
-            // The sign bit of a shorter number moves to the top and back.
-            (_, n) => ((bits << (64 - 8 * n)) as i64 >> (64 - 8 * n)) as f64,
+            (b'f', 4) => numbers(bytes, big, |b| f32::from_le_bytes(b).into()),
+            (b'f', _) => numbers(bytes, big, f64::from_le_bytes),
+            (b'u', 1) => numbers(bytes, big, |b| u8::from_le_bytes(b).into()),
+            (b'u', 2) => numbers(bytes, big, |b| u16::from_le_bytes(b).into()),
+            (b'u', 4) => numbers(bytes, big, |b| u32::from_le_bytes(b).into()),
+            (b'u', _) => numbers(bytes, big, |b| u64::from_le_bytes(b) as f64),
+            (_, 1) => numbers(bytes, big, |b| i8::from_le_bytes(b).into()),
+            (_, 2) => numbers(bytes, big, |b| i16::from_le_bytes(b).into()),
+            (_, 4) => numbers(bytes, big, |b| i32::from_le_bytes(b).into()),
+            _ => numbers(bytes, big, |b| i64::from_le_bytes(b) as f64),
         }
     }
+}
+
+/// Numbers of N bytes each, whose value is told by their little-endian bytes.
+fn numbers<const N: usize>(bytes: &[u8], big: bool, number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+    let (all, _) = bytes.as_chunks::<N>();
+    let reversed = |bytes: &[u8; N]| {
+        let mut bytes = *bytes;
+        bytes.reverse();
+        bytes
+    };
+    all.iter().map(|bytes| number(if big { reversed(bytes) } else { *bytes })).collect()
 }
 
 /// The head: a Python dictionary of three entries.

@@ -54,9 +54,11 @@ pub fn decode(content: &[u8], path: &Path) -> Result<Grid<f32>, IoError> {
         return Err(IoError::new(path, reason, "the file is cut or damaged; write it again"));
     }
     let number = if scale < 0.0 { f32::from_le_bytes } else { f32::from_be_bytes };
-    let rows = values.chunks_exact(4 * width).rev();
-    let values = rows.flat_map(|row| row.chunks_exact(4)).map(|b| number([b[0], b[1], b[2], b[3]]));
-    Grid::from_values(width, height, values.collect()).ok_or_else(|| refuse("has no values"))
+    let mut all = Vec::with_capacity(width * height);
+    for row in values.chunks_exact(4 * width).rev() {
+        all.extend(row.as_chunks().0.iter().map(|&bytes| number(bytes)));
+    }
+    Grid::from_values(width, height, all).ok_or_else(|| refuse("has no values"))
 }
 
 /// The next word of the head, and the one white space after it, taken off the content.

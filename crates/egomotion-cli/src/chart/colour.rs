@@ -82,9 +82,12 @@ impl Spread {
     /// One range of coordinates for the ranges of many pictures.
     pub fn common(self, ranges: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
         let (mut lows, mut highs): (Vec<f64>, Vec<f64>) = ranges.unzip();
-        // The middle of the pictures decides, so that a single bad one does not.
-        let low = egomotion::estimate::median(&mut lows);
-        let high = egomotion::estimate::median(&mut highs);
+        lows.sort_unstable_by(f64::total_cmp);
+        highs.sort_unstable_by(f64::total_cmp);
+        // A few bad pictures decide nothing; a part of the run that is unlike the rest does.
+        let bad = (lows.len() / 3).min(1 + lows.len() / 10);
+        let low = lows.get(bad).copied().unwrap_or(f64::NAN);
+        let high = highs.iter().rev().nth(bad).copied().unwrap_or(f64::NAN);
         let Some((low, high)) = extent([low, high]) else { return (0.0, 1.0) };
         match self {
             Self::Symmetric => {
@@ -125,6 +128,9 @@ mod tests {
         assert_eq!(Spread::Linear.common(ranges.into_iter()), (1.0, 5.0));
         assert_eq!(Spread::Symmetric.common(ranges.into_iter()), (-5.0, 5.0));
         assert_eq!(Spread::Linear.common(std::iter::empty()), (0.0, 1.0));
+        // There and back again.
+        let ways = [(-12.0, -11.0), (11.0, 12.0)].into_iter().cycle().take(32);
+        assert_eq!(Spread::Symmetric.common(ways), (-12.0, 12.0));
         let (low, high) = Spread::Linear.common([(3.0, 3.0)].into_iter());
         assert!(low <= 3.0 && 3.0 < high);
     }

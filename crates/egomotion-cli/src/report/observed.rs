@@ -77,8 +77,9 @@ fn counts(rows: &[FrameRow]) -> ([usize; 6], usize) {
 /// A lane for each component, filled where it was determined, with how often in words.
 pub fn lanes(report: &Report<'_>, timeline: &Timeline<'_>) -> Markup {
     let (counts, answered) = counts(report.frames);
-    // Room for the words at the left, and for how often at the right.
-    let (left, right) = (84.0, SIZE.0 - 62.0);
+    // Room for the words at the left, and for how often, at 6.5 a character, at the right.
+    let said = |count: usize| format!("{count} of {answered}");
+    let (left, right) = (84.0, SIZE.0 - 10.0 - 6.5 * said(answered).len() as f64);
     let axes = Axes {
         x: Scale::linear(timeline.range, (left, right)),
         y: Scale::linear((0.0, 6.0), (6.0 * LANE, 0.0)),
@@ -96,7 +97,7 @@ pub fn lanes(report: &Report<'_>, timeline: &Timeline<'_>) -> Markup {
                 text x=(format!("{:.1}", left - 6.0)) y=(format!("{:.1}", LANE * i as f64 + 14.0)) text-anchor="end" { (word) }
                 path class="determined" stroke-width=(format!("{wide:.2}")) d=(marks(i, true)) {}
                 path class="undetermined" stroke-width=(format!("{wide:.2}")) d=(marks(i, false)) {}
-                text x=(format!("{:.1}", right + 6.0)) y=(format!("{:.1}", LANE * i as f64 + 14.0)) { (counts[i]) " of " (answered) }
+                text x=(format!("{:.1}", right + 6.0)) y=(format!("{:.1}", LANE * i as f64 + 14.0)) { (said(counts[i])) }
             }
             (cursor(timeline, &axes))
         }
