@@ -71,7 +71,8 @@ fn an_album_thins_itself() {
     assert_eq!(rows, (1..=1000).step_by(32).collect::<Vec<_>>());
     assert!(made < 120, "{made}");
     assert_eq!([Album::of(2).width_px((1242, 375)), Album::of(2).width_px((64, 48))], [960, 64]);
-    assert!((320..500).contains(&Album::of(5000).width_px((1242, 375))));
+    // Forty-eight pictures in 5.6 MB, at 1.5 bytes a pixel.
+    assert!((480..520).contains(&Album::of(5000).width_px((1242, 375))));
 }
 
 #[test]
