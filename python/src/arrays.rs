@@ -1,7 +1,7 @@
 //! NumPy arrays in, planes and points out, and back.
 
 use egomotion::geometry::{Field, Grid, Image};
-use egomotion_io::image::LUMA;
+use egomotion_io::image::{LUMA, WIDE};
 use nalgebra::{SMatrix, SVector};
 use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -33,22 +33,23 @@ fn wrong_shape(name: &str, found: &[usize], wanted: &str) -> PyErr {
     PyValueError::new_err(format!("{name} has shape {found:?}; give {wanted}"))
 }
 
-/// Grey levels of an image: (H, W), or colours (H, W, 3) or (H, W, 4) as red, green, blue; uint8, uint16 or float32.
+/// Grey levels 0 … 255 of an image, as those of files: (H, W), or colours (H, W, 3) or (H, W, 4) as red, green, blue; uint8, uint16 (0 … 65535) or
+/// float32.
 pub fn image(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Image> {
     let array = contiguous(argument)?;
     if let Some((shape, levels)) = values::<u8>(&array)? {
-        return grey(name, &shape, &levels);
+        return grey(name, &shape, &levels, 1.0);
     }
     if let Some((shape, levels)) = values::<u16>(&array)? {
-        return grey(name, &shape, &levels);
+        return grey(name, &shape, &levels, WIDE);
     }
     if let Some((shape, levels)) = values::<f32>(&array)? {
-        return grey(name, &shape, &levels);
+        return grey(name, &shape, &levels, 1.0);
     }
     Err(wrong_type(name, &array, "uint8, uint16 or float32"))
 }
 
-fn grey<T: Copy + Into<f32>>(name: &str, shape: &[usize], levels: &[T]) -> PyResult<Image> {
+fn grey<T: Copy + Into<f32>>(name: &str, shape: &[usize], levels: &[T], unit: f32) -> PyResult<Image> {
     let wanted = "(height, width) or (height, width, 3), not empty";
     let (height, width, channels) = match *shape {
         [height, width] => (height, width, 1),
@@ -56,8 +57,8 @@ fn grey<T: Copy + Into<f32>>(name: &str, shape: &[usize], levels: &[T]) -> PyRes
         _ => return Err(wrong_shape(name, shape, wanted)),
     };
     let level = |pixel: &[T]| match *pixel {
-        [grey] => grey.into(),
-        [r, g, b, ..] => LUMA[0] * r.into() + LUMA[1] * g.into() + LUMA[2] * b.into(),
+        [grey] => grey.into() / unit,
+        [r, g, b, ..] => (LUMA[0] * r.into() + LUMA[1] * g.into() + LUMA[2] * b.into()) / unit,
         _ => 0.0,
     };
     let levels = levels.chunks_exact(channels).map(level).collect();

@@ -51,7 +51,8 @@ impl StereoMotion {
 
     /// The motion from the last good frame to this one, at `time` in seconds.
     ///
-    /// Images are (H, W), or (H, W, 3) as red, green, blue; uint8, uint16 or float32. With `disparity` (H, W), and perhaps
+    /// Images are (H, W), or (H, W, 3) as red, green, blue; uint8, uint16 (0 … 65535) or float32
+    /// (0 … 255). With `disparity` (H, W), and perhaps
     /// its `disparity_sigma`, of the left image's pixels that map is used in place of our own, and the right image may
     /// be None. An image that cannot be used is no exception: the answer's status says why.
     #[pyo3(signature = (left, right, time, *, disparity = None, disparity_sigma = None))]

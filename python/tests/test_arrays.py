@@ -29,7 +29,7 @@ def test_types_and_strides_do_not_matter() -> None:
     unaligned = np.frombuffer(b"\0" + grey.astype(np.float32).tobytes(), np.float32, offset=1).reshape(24, 32)
     assert not unaligned.flags.aligned
     kinds: list[Any] = [
-        grey.astype(np.uint16),
+        grey.astype(np.uint16) * 257,
         grey.astype(np.float32),
         np.asfortranarray(grey),
         grey[::-1, ::-1].copy()[::-1, ::-1],

@@ -15,9 +15,10 @@ FRAMES = [C.render(k, samples=2) for k in range(3)]
 
 
 def pushed(motion: em.StereoMotion, kind: type = np.float32) -> list[em.FrameMotion]:
-    return [
-        motion.push(left.astype(kind), right.astype(kind), 0.1 * k) for k, (left, right) in enumerate(FRAMES)
-    ]
+    # 16 bits are as white at 65535 as 8 bits at 255.
+    unit = 257 if kind is np.uint16 else 1
+    pairs = [[image.astype(kind) * kind(unit) for image in pair] for pair in FRAMES]
+    return [motion.push(left, right, 0.1 * k) for k, (left, right) in enumerate(pairs)]
 
 
 def inside(answer: em.FrameMotion, truth: Any, sigmas: float = 4.0) -> bool:

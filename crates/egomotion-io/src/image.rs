@@ -14,7 +14,7 @@ use crate::{IoError, read};
 pub const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 
 /// 16-bit levels for each 8-bit one: 65535 is as white as 255.
-const WIDE: f32 = 257.0;
+pub const WIDE: f32 = 257.0;
 
 /// Endings of the names of images that can be read, in small letters.
 pub const ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "tif", "tiff", "pgm", "ppm", "pnm"];
