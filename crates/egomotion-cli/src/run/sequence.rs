@@ -39,7 +39,7 @@ pub fn run_sequence(
     // Tracks are sparse, whatever was asked for.
     let config = &match &tracks {
         Some(_) => Config { observe: Observe::Sparse, ..config.clone() },
-        None => config.clone(),
+        None => tolerated(args, config, sequence),
     };
     config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
     if tracks.is_some() && (args.map_files().any() || args.disparity.is_some() || args.flow.is_some()) {
@@ -101,6 +101,16 @@ pub fn run_sequence(
     };
     folder.write_report(&about, &outcome)?;
     Ok(DoneSequence { summary, first_failure })
+}
+
+/// The choices of a run, with the tolerance of what the source was taken with unless they have one.
+fn tolerated(args: &RunArgs, config: &Config, sequence: &Sequence) -> Config {
+    let config = config.clone();
+    match sequence.depth_sensor.filter(|_| uses_depth(args, sequence)) {
+        Some(sensor) => sensor.noise.tolerated(config),
+        None if config.tolerance.is_exact() => Config { tolerance: sequence.tolerance, ..config },
+        None => config,
+    }
 }
 
 /// The sensor that is asked for must be there.
