@@ -11,19 +11,18 @@ use rayon::prelude::*;
 
 use super::Observability;
 use super::blocks::{self, BlockScore, Blocks};
-use super::m_estimator::StudentT;
-use super::measurement::{At, Measurement, squares};
+use super::maximum_likelihood::MaximumLikelihood;
+use super::measurement::{At, Measurement};
 use super::mixture::Mixture;
-use super::tolerance::{ERRORS, Sensed, SensorErrors, SensorPrior};
-use crate::geometry::{StereoRig, Twist};
+use super::tolerance::{CALIBRATION, ERRORS, Sensed, Sensor, SensorErrors, SensorPrior};
+use crate::geometry::StereoRig;
+use crate::geometry::gaussian::product;
 use crate::observe::StereoTrack;
 
 /// φ and errors.
 const ALL: usize = 6 + ERRORS;
 /// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
 const STRIP: usize = 512;
-/// Passes that move structures to where they settle at a motion.
-const PASSES: usize = 2;
 
 /// What one step towards the most likely motion and errors says.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,22 +35,20 @@ pub struct Joint {
     pub cov: Matrix6<f64>,
 }
 
-/// Step from φ and `errors`, for which `observations` are corrected already; `None` where some direction of motion is
-/// not determined.
+/// Step from what was `found` of `observations` from which `errors` are taken already; `None` where some direction of
+/// motion is not determined.
 pub fn joint_step(
     observations: &[Sensed],
     rig: &StereoRig,
-    phi: &Twist,
+    found: &MaximumLikelihood,
     errors: &SensorErrors,
     prior: &SensorPrior,
     blocks: &Blocks,
-    kernel: &StudentT,
 ) -> Option<Joint> {
-    let at = At::new(*phi, rig);
-    let tracks: Vec<StereoTrack> = observations.iter().map(|sensed| sensed.track).collect();
-    let (mixture, scale2) = Mixture::of(kernel, &mut squares(&tracks, &at))?;
-    let weighing = Weighing { mixture, scale2, prior, blocks };
-    let by_block = Sums::by_block(observations, &at, &weighing);
+    let at = At::new(found.motion.phi(), rig);
+    let weighing = Weighing { mixture: found.mixture, scale2: found.scale2, blocks };
+    let by_block: Vec<Sums> =
+        Moments::by_block(observations, &at, &weighing).iter().map(|m| m.sums(&at, prior)).collect();
     let unit = prior.sigma.map(|sigma| if sigma > 0.0 { sigma.recip() } else { 0.0 });
     let solved = Solved::of(&by_block, &errors.vector().component_mul(&unit))?;
     let moved = errors.vector() + solved.step.fixed_rows::<ERRORS>(6).component_mul(&prior.sigma);
@@ -65,28 +62,29 @@ pub fn joint_step(
 struct Weighing<'a> {
     mixture: Mixture,
     scale2: f64,
-    prior: &'a SensorPrior,
     blocks: &'a Blocks,
 }
 
-/// Sums over the observations of a block.
+/// The motion of the scene and the calibration; the other errors are motions too, of a part of the observations.
+const BASE: usize = 6 + CALIBRATION;
+
+/// Sums over the observations of a block, times 1, the image row, its square, and whether it is of a depth image.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    score: BlockScore<ALL>,
+struct Moments {
+    information: [SMatrix<f64, BASE, BASE>; 4],
     /// By how much the score's derivative is less than the information, because weights change as well.
-    reweighting: BlockScore<ALL>,
+    reweighting: [SMatrix<f64, BASE, BASE>; 4],
+    score: [SVector<f64, BASE>; 4],
 }
 
-impl Sums {
+impl Moments {
     fn by_block(observations: &[Sensed], at: &At<'_>, weighing: &Weighing<'_>) -> Vec<Self> {
         let strips: Vec<Vec<(usize, Self)>> =
             observations.par_chunks(STRIP).map(|strip| Self::runs(strip, at, weighing)).collect();
         let mut by_block = vec![Self::default(); weighing.blocks.count()];
-        for (block, sums) in strips.iter().flatten() {
-            by_block[*block].merge(sums);
+        for (block, moments) in strips.iter().flatten() {
+            by_block[*block].merge(moments);
         }
-        let jacobian = StereoTrack::by_phi(at);
-        by_block.iter_mut().for_each(|sums| sums.by_phi(&jacobian));
         by_block
     }
 
@@ -96,56 +94,94 @@ impl Sums {
         for sensed in strip {
             let (x, y) = sensed.track.position();
             let block = weighing.blocks.index(x, y);
-            match runs.last_mut() {
-                Some((last, sums)) if *last == block => sums.add(sensed, at, weighing),
-                _ => {
-                    let mut sums = Self::default();
-                    sums.add(sensed, at, weighing);
-                    runs.push((block, sums));
-                }
+            if runs.last().is_none_or(|(last, _)| *last != block) {
+                runs.push((block, Self::default()));
+            }
+            if let Some((_, moments)) = runs.last_mut() {
+                moments.add(sensed, at, weighing);
             }
         }
         runs
     }
 
     fn add(&mut self, sensed: &Sensed, at: &At<'_>, weighing: &Weighing<'_>) {
+        // Once to move the structure to where it settles.
         let mut structure: Vector3<f64> = sensed.track.structure();
-        for _ in 0..PASSES {
-            let _settling = sensed.track.linearise(&mut structure, at);
-        }
+        let _measured = sensed.track.linearise(&mut structure, at);
         let settled = structure;
         let Some(l) = sensed.track.linearise(&mut structure, at) else { return };
-        let Some(by_errors) = sensed.by_errors(&settled, &l.by_motion, at) else { return };
-        let mut by_all = SMatrix::<f64, 3, ALL>::zeros();
+        let Some(by_calibration) = sensed.by_calibration(&settled, at) else { return };
+        let mut by_all = SMatrix::<f64, 3, BASE>::zeros();
         by_all.fixed_columns_mut::<6>(0).copy_from(&l.by_motion);
-        for k in 0..ERRORS {
-            by_all.set_column(6 + k, &(by_errors.column(k) * weighing.prior.sigma[k]));
-        }
+        by_all.fixed_columns_mut::<CALIBRATION>(6).copy_from(&by_calibration);
         let inverse_cov = l.inverse_cov / weighing.scale2;
-        let q = l.misclosure.dot(&(inverse_cov * l.misclosure));
+        let q = l.misclosure.dot(&product(&inverse_cov, &l.misclosure));
         let (weight, slope) = weighing.mixture.weight(q);
-        let weighted = by_all.transpose() * (inverse_cov * weight);
-        self.score.information += weighted * by_all;
-        self.score.score += weighted * l.misclosure;
-        let pull = by_all.transpose() * (inverse_cov * l.misclosure);
-        self.reweighting.information += pull * pull.transpose() * (weight * slope);
+        let across = by_all.transpose();
+        let weighted = product(&across, &(inverse_cov * weight));
+        let information = product(&weighted, &by_all);
+        let score: SVector<f64, BASE> = product(&weighted, &l.misclosure);
+        let reweighting = product(&(score * (slope / weight.max(f64::MIN_POSITIVE))), &score.transpose());
+        let mut times = |k: usize, factor: f64| {
+            self.information[k] += information * factor;
+            self.reweighting[k] += reweighting * factor;
+            self.score[k] += score * factor;
+        };
+        times(0, 1.0);
+        match sensed.by {
+            Sensor::Stereo => {}
+            Sensor::Image => {
+                let row = sensed.row(at.rig());
+                times(1, row);
+                times(2, row * row);
+            }
+            Sensor::Depth => times(3, 1.0),
+        }
     }
 
     fn merge(&mut self, other: &Self) {
-        self.score.information += other.score.information;
-        self.score.score += other.score.score;
-        self.reweighting.information += other.reweighting.information;
+        for k in 0..4 {
+            self.information[k] += other.information[k];
+            self.reweighting[k] += other.reweighting[k];
+            self.score[k] += other.score[k];
+        }
     }
 
-    /// Sums by the small motion of a measurement as sums by φ.
-    fn by_phi(&mut self, jacobian: &Matrix6<f64>) {
-        let mut all = SMatrix::<f64, ALL, ALL>::identity();
-        all.fixed_view_mut::<6, 6>(0, 0).copy_from(jacobian);
-        let across = all.transpose();
-        self.score.information = across * self.score.information * all;
-        self.score.score = across * self.score.score;
-        self.reweighting.information = across * self.reweighting.information * all;
+    /// Sums by φ and by the errors in units of their prior standard deviations.
+    fn sums(&self, at: &At<'_>, prior: &SensorPrior) -> Sums {
+        // Errors that are motions follow the calibration: during read-out (moments of the row), then of depth images.
+        let base = |i: usize| if i < BASE { i } else { (i - BASE) % 6 };
+        let kind = |i: usize| if i < BASE { 0 } else { 1 + (i - BASE) / 6 };
+        const MOMENT: [[Option<usize>; 3]; 3] =
+            [[Some(0), Some(1), Some(3)], [Some(1), Some(2), None], [Some(3), None, Some(3)]];
+        let expanded = |moments: &[SMatrix<f64, BASE, BASE>; 4]| {
+            SMatrix::<f64, ALL, ALL>::from_fn(|i, j| {
+                MOMENT[kind(i)][kind(j)].map_or(0.0, |k| moments[k][(base(i), base(j))])
+            })
+        };
+        let score =
+            SVector::<f64, ALL>::from_fn(|i, _| MOMENT[0][kind(i)].map_or(0.0, |k| self.score[k][base(i)]));
+        let mut units = SMatrix::<f64, ALL, ALL>::identity();
+        units.fixed_view_mut::<6, 6>(0, 0).copy_from(&StereoTrack::by_phi(at));
+        for (k, sigma) in prior.sigma.iter().enumerate() {
+            units[(6 + k, 6 + k)] = *sigma;
+        }
+        let across = units.transpose();
+        Sums {
+            score: BlockScore {
+                information: across * expanded(&self.information) * units,
+                score: across * score,
+            },
+            reweighting: across * expanded(&self.reweighting) * units,
+        }
     }
+}
+
+/// Sums over the observations of a block, by all unknowns.
+#[derive(Debug, Clone, Copy)]
+struct Sums {
+    score: BlockScore<ALL>,
+    reweighting: SMatrix<f64, ALL, ALL>,
 }
 
 /// The system of all unknowns, solved.
@@ -161,7 +197,7 @@ impl Solved {
     fn of(by_block: &[Sums], errors: &SVector<f64, ERRORS>) -> Option<Self> {
         let information: SMatrix<f64, ALL, ALL> = by_block.iter().map(|b| b.score.information).sum();
         let score: SVector<f64, ALL> = by_block.iter().map(|b| b.score.score).sum();
-        let reweighting: SMatrix<f64, ALL, ALL> = by_block.iter().map(|b| b.reweighting.information).sum();
+        let reweighting: SMatrix<f64, ALL, ALL> = by_block.iter().map(|b| b.reweighting).sum();
         let design_effect = design_effect(by_block, &information)?;
         let mut prior = SMatrix::<f64, ALL, ALL>::zeros();
         let mut score = score;

@@ -2,8 +2,8 @@
 //!
 //! No number of pixels averages out a wrong focal length, nor an image whose last row is taken after its first
 //! while the camera turns ever faster. Each such error is a parameter with mean zero and the standard deviation
-//! that the [`Tolerance`] states; observations may tell more of it. What an error does to an observation is undone by
-//! [`SensorErrors::corrected`], exactly, and its effect to first order is [`Sensed::by_errors`].
+//! that the [`Tolerance`] states; observations may tell more of it ([`super::joint`]). What an error does to an
+//! observation is undone by [`SensorErrors::corrected`].
 
 use documented::DocumentedFields;
 use nalgebra::{SMatrix, SVector, Vector3};
@@ -37,6 +37,8 @@ const ACCELERATION: (f64, f64) = (2.0, 5.0);
 /// Errors that a [`Tolerance`] allows: focal length, principal point (2), scale, motion during read-out (6), motion
 /// between image and depth (6).
 pub(super) const ERRORS: usize = 16;
+/// The first four of them.
+pub(super) const CALIBRATION: usize = 4;
 
 impl Tolerance {
     /// Whether nothing is allowed for.
@@ -158,7 +160,7 @@ impl SensorErrors {
         }
         let excess = match sensed.by {
             Sensor::Stereo => None,
-            Sensor::Image => Some(self.during.scaled(row(&sensed.track.before.mean, rig))),
+            Sensor::Image => Some(self.during.scaled(sensed.row(rig))),
             Sensor::Depth => Some(self.apart),
         };
         // Most often there is none, and it costs a projection.
@@ -170,42 +172,32 @@ impl SensorErrors {
     }
 }
 
-/// Where in the image's height a point lies, −½ … ½.
-fn row(xyd: &Vector3<f64>, rig: &StereoRig) -> f64 {
-    let height = rig.height_px.max(1) as f64;
-    (rig.pixel_from_image(xyd.x, xyd.y).1 + 0.5) / height - 0.5
-}
-
 impl Sensed {
-    /// −∂e/∂errors of the misclosure e at a structure, given that by the small motion of the whole scene.
+    /// Where in the image's height it begins, −½ … ½.
+    pub(super) fn row(&self, rig: &StereoRig) -> f64 {
+        let before = &self.track.before.mean;
+        let height = rig.height_px.max(1) as f64;
+        (rig.pixel_from_image(before.x, before.y).1 + 0.5) / height - 0.5
+    }
+
+    /// −∂e/∂(focal length, principal point, scale) of the misclosure e at a structure.
     ///
     /// At what the motion predicts, not at what was measured: that would shrink residuals by scaling them.
-    pub(super) fn by_errors(
+    pub(super) fn by_calibration(
         &self,
         structure: &Vector3<f64>,
-        by_motion: &SMatrix<f64, 3, 6>,
         at: &At<'_>,
-    ) -> Option<SMatrix<f64, 3, ERRORS>> {
-        let rig = at.rig();
+    ) -> Option<SMatrix<f64, 3, CALIBRATION>> {
         let (predicted, by_structure) = led(structure, at)?;
         let change = |after: Vector3<f64>, before: Vector3<f64>| after - by_structure * before;
-        let mask = Vector3::new(1.0, 1.0, if self.by == Sensor::Stereo { 1.0 } else { 0.0 });
-        let (x, y) = (Vector3::x(), Vector3::y() * rig.aspect());
-        let depth = Vector3::z();
-        let mut columns = SMatrix::<f64, 3, ERRORS>::zeros();
-        columns.set_column(0, &change(predicted.component_mul(&mask), structure.component_mul(&mask)));
-        columns.set_column(1, &change(x, x));
-        columns.set_column(2, &change(y, y));
-        columns.set_column(3, &change(predicted.component_mul(&depth), structure.component_mul(&depth)));
-        match self.by {
-            Sensor::Stereo => {}
-            Sensor::Image => {
-                let share = row(&self.track.before.mean, rig);
-                columns.fixed_columns_mut::<6>(4).copy_from(&(by_motion * share));
-            }
-            Sensor::Depth => columns.fixed_columns_mut::<6>(10).copy_from(by_motion),
-        }
-        Some(columns)
+        let scaled = Vector3::new(1.0, 1.0, if self.by == Sensor::Stereo { 1.0 } else { 0.0 });
+        let (x, y, d) = (Vector3::x(), Vector3::y() * at.rig().aspect(), Vector3::z());
+        Some(SMatrix::from_columns(&[
+            change(predicted.component_mul(&scaled), structure.component_mul(&scaled)),
+            change(x, x),
+            change(y, y),
+            change(predicted.component_mul(&d), structure.component_mul(&d)),
+        ]))
     }
 }
 
@@ -227,7 +219,15 @@ mod tests {
         for by in [Sensor::Stereo, Sensor::Image, Sensor::Depth] {
             let sensed = Sensed { track: StereoTrack { before: end(before), after: end(after) }, by };
             let exact = sensed.track.linearise(&mut before.clone(), &at).unwrap();
-            let columns = sensed.by_errors(&before, &exact.by_motion, &at).unwrap();
+            let mut columns = SMatrix::<f64, 3, ERRORS>::zeros();
+            columns.fixed_columns_mut::<4>(0).copy_from(&sensed.by_calibration(&before, &at).unwrap());
+            match by {
+                Sensor::Stereo => {}
+                Sensor::Image => {
+                    columns.fixed_columns_mut::<6>(4).copy_from(&(exact.by_motion * sensed.row(&rig)));
+                }
+                Sensor::Depth => columns.fixed_columns_mut::<6>(10).copy_from(&exact.by_motion),
+            }
             for k in 0..ERRORS {
                 let misclosure = |h: f64| {
                     let errors = SensorErrors::from_vector(&(SVector::ith(k, h)));

@@ -10,6 +10,8 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::config::Config;
 use super::solve::{SETTLED, Solver};
+use crate::estimate::m_estimator::StudentT;
+use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
 use crate::estimate::tolerance::{Sensed, Sensor, SensorErrors};
 use crate::estimate::{MotionEstimate, Unsolvable, median};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
@@ -39,6 +41,9 @@ pub(super) fn solve_with_shape(
     config: &Config,
     dt_s: f64,
 ) -> Result<MotionEstimate, Unsolvable> {
+    // The mixture takes every residual as one in three dimensions; shape has one, beside which places would look like outliers.
+    let config =
+        &Config { maximum_likelihood: without_mixture(&config.maximum_likelihood), ..config.clone() };
     let tracked = Tracked { flow: pair.every(config.sample_step_px, DensePair::stereo_track), corners };
     let mut phi = start.copied().unwrap_or_else(Twist::zero);
     let mut reach = if start.is_some() { OTHER_SURFACE_PX.1 } else { OTHER_SURFACE_PX.0 };
@@ -59,6 +64,10 @@ pub(super) fn solve_with_shape(
         }
         reach = (0.5 * reach).max(OTHER_SURFACE_PX.1);
     }
+}
+
+fn without_mixture(options: &MaximumLikelihoodOptions) -> MaximumLikelihoodOptions {
+    MaximumLikelihoodOptions { kernel: StudentT { fitted: false, ..options.kernel }, ..*options }
 }
 
 /// Points whose places were found in both images.

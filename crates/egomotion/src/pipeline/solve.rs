@@ -192,7 +192,7 @@ impl<'a> Solver<'a> {
         let (phase, mut motion) = (self.phase(&found), found.motion);
         let joint = match self.prior.is_exact() {
             true => None,
-            false => joint_step(corrected, self.rig, &motion.phi(), errors, &self.prior, blocks, kernel),
+            false => joint_step(corrected, self.rig, &found, errors, &self.prior, blocks),
         };
         if let Some(joint) = joint {
             motion.theta.mean += joint.step;
