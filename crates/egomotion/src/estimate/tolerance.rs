@@ -32,7 +32,7 @@ pub struct Tolerance {
 /// Standard deviation of the acceleration of a camera that is held in a hand, in m/s² and rad/s².
 ///
 /// Walking hands accelerate by some m/s²; a wrist that turns to and fro twice a second by 5° accelerates by up to 14 rad/s².
-const ACCELERATION: (f64, f64) = (2.0, 5.0);
+pub const ACCELERATION: (f64, f64) = (2.0, 5.0);
 
 /// Errors that a [`Tolerance`] allows: focal length, principal point (2), scale, motion during read-out (6), motion
 /// between image and depth (6).
