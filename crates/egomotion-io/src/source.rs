@@ -17,6 +17,7 @@ mod tum_rgbd;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use egomotion::estimate::Tolerance;
 use egomotion::geometry::{Camera, RigidMotion, StereoRectification, StereoRig};
 use egomotion::pipeline::rgbd::DepthNoise;
 use serde::Serialize;
@@ -99,6 +100,8 @@ pub struct Sequence {
     pub rectification: Option<StereoRectification>,
     /// What took the depth images; `None` where the layout has none.
     pub depth_sensor: Option<DepthSensor>,
+    /// How well the rig is known, as far as the layout tells; all zero is exact.
+    pub tolerance: Tolerance,
     /// Whether each image file holds the left image and the right one side by side.
     pub side_by_side: bool,
     /// File of stereo tracks in place of images, for [`crate::tracks`].
@@ -117,6 +120,7 @@ impl Sequence {
             rig,
             rectification: None,
             depth_sensor: None,
+            tolerance: Tolerance::default(),
             side_by_side: false,
             tracks: None,
             truth_maps: None,

@@ -10,6 +10,7 @@ use egomotion::estimate::Row;
 use egomotion::estimate::least_squares::Weighting;
 use egomotion::estimate::lmeds::{LmedsOptions, lmeds, plain_search, random_subsets, search, trials};
 use egomotion::estimate::systematic::common_errors;
+use egomotion::estimate::tolerance::Sensor;
 use egomotion::geometry::Twist;
 use egomotion::motion::depth_velocity::{DisparityOffset, RigidPrediction};
 use egomotion::observe::tracks::{Hints, stereo_tracks};
@@ -33,15 +34,16 @@ fn estimation(c: &mut Criterion) {
     let tracks = stereo_tracks(&before, &after, &rig, Hints::default(), &config.tracks);
     let pair =
         DensePair { rig: &rig, before: &maps.0, after: &maps.1, flow: &flow, flow_right: None, given: false };
-    let start = solve(&Observed::Sparse(&tracks), &rig, &Twist::zero(), &config).unwrap().phi();
+    let start =
+        solve(&Observed::Sparse(&tracks, Sensor::Stereo), &rig, &Twist::zero(), &config, 0.1).unwrap().phi();
 
     c.bench_function("dense observations", |b| {
         b.iter(|| pair.every(config.sample_step_px, DensePair::stereo_track));
     });
     c.bench_function("solve, dense", |b| {
-        b.iter(|| solve(&Observed::Dense(pair, &tracks), &rig, &start, &config));
+        b.iter(|| solve(&Observed::Dense(pair, &tracks), &rig, &start, &config, 0.1));
     });
-    let motion = solve(&Observed::Dense(pair, &tracks), &rig, &start, &config).unwrap();
+    let motion = solve(&Observed::Dense(pair, &tracks), &rig, &start, &config, 0.1).unwrap();
     let kernel = &config.maximum_likelihood.kernel;
     c.bench_function("common errors of tracks", |b| {
         b.iter(|| common_errors(&tracks, &rig, &motion.phi(), kernel));

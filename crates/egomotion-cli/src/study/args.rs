@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 
 use egomotion::pipeline::Method;
 use egomotion::sim::Sequence;
@@ -180,11 +180,27 @@ pub struct ConsistencyArgs {
     /// Size of the rendered images.
     #[arg(long, value_name = "WxH", default_value = "320x240", value_parser = size)]
     pub size: (usize, usize),
+    /// What takes the pairs: a stereo rig or a depth camera, which errs as its tolerance says.
+    #[arg(long, value_name = "SENSOR", default_value = "stereo")]
+    pub sensor: PairSensor,
     /// Tracks alone: φ, and no maps.
     #[arg(long)]
     pub sparse: bool,
     #[command(flatten)]
     pub laboratory: LaboratoryArgs,
+}
+
+/// What takes the pairs of the consistency study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PairSensor {
+    /// Two cameras.
+    Stereo,
+    /// A Kinect held in a hand.
+    Kinect,
+    /// A time-of-flight camera held in a hand.
+    TimeOfFlight,
+    /// Rendered images and depth in half-precision numbers.
+    Rendered,
 }
 
 /// Levels of disparity in a pixel; `None` where disparity is not rounded.

@@ -12,7 +12,7 @@ mod tests;
 use anyhow::Result;
 use egomotion::pipeline::Observe;
 use egomotion::study::assumptions::Assumptions;
-use egomotion::study::consistency::Consistency;
+use egomotion::study::consistency::{Consistency, DepthKind, Sensor};
 use egomotion::study::draw::Measuring;
 use egomotion::study::efficiency::Efficiency;
 use egomotion::study::real::LabStudy;
@@ -24,7 +24,7 @@ use crate::session::stop_signal;
 use crate::{Ending, terminal};
 
 pub use args::StudyCommand;
-use args::{ConsistencyArgs, EfficiencyArgs, LaboratoryArgs, TableArgs};
+use args::{ConsistencyArgs, EfficiencyArgs, LaboratoryArgs, PairSensor, TableArgs};
 use laboratory::{Laboratory, Options};
 
 /// Run what was asked for.
@@ -85,6 +85,12 @@ fn consistency(args: &ConsistencyArgs) -> Consistency {
         sequences: args.sequences.clone().unwrap_or(own.sequences),
         width_px: args.size.0,
         height_px: args.size.1,
+        sensor: match args.sensor {
+            PairSensor::Stereo => Sensor::Stereo,
+            PairSensor::Kinect => Sensor::Depth(DepthKind::Kinect),
+            PairSensor::TimeOfFlight => Sensor::Depth(DepthKind::TimeOfFlight),
+            PairSensor::Rendered => Sensor::Depth(DepthKind::Rendered),
+        },
         observe: if args.sparse { Observe::Sparse } else { Observe::Dense },
         pairs: args.laboratory.draws.unwrap_or(own.pairs),
         seed: args.laboratory.seed,

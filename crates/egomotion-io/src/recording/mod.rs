@@ -6,6 +6,7 @@ mod reader;
 
 use std::path::{Path, PathBuf};
 
+use egomotion::estimate::Tolerance;
 use egomotion::geometry::{Grid, RigidMotion, StereoRig};
 use egomotion::pipeline::stereo::PipelineError;
 use egomotion::pipeline::{Config, Frame, Observe, TrackPoint, Unanswered};
@@ -83,6 +84,7 @@ pub struct Recording {
     pub frames: Vec<(FrameFiles, f64)>,
     /// Pixels of the left and of the right image never to use.
     pub masks: [Option<Grid<bool>>; 2],
+    tolerance: Tolerance,
     reader: Reader,
 }
 
@@ -107,7 +109,8 @@ impl Recording {
         };
         let mask = choice.mask.as_deref().map(|path| read_mask(path, &rig)).transpose()?;
         let [left, right] = unseen(reader.rectifier.as_ref());
-        Ok(Self { rig, frames, masks: [joined(mask, left), right], reader })
+        let tolerance = sequence.tolerance;
+        Ok(Self { rig, frames, masks: [joined(mask, left), right], tolerance, reader })
     }
 
     /// Number of frames.
@@ -141,10 +144,17 @@ impl Recording {
         self.reader.depth.is_some()
     }
 
-    /// The settings as they apply to it: tracks are sparse, whatever was asked for.
+    /// The settings as they apply to it: tracks are sparse, whatever was asked for, and images have the tolerance of what
+    /// took them unless the settings have one.
     pub fn config(&self, config: &Config) -> Config {
-        let observe = if self.is_of_tracks() { Observe::Sparse } else { config.observe };
-        Config { observe, ..config.clone() }
+        if self.is_of_tracks() {
+            return Config { observe: Observe::Sparse, ..config.clone() };
+        }
+        match &self.reader.depth {
+            Some((camera, _)) => camera.noise.tolerated(config.clone()),
+            None if config.tolerance.is_exact() => Config { tolerance: self.tolerance, ..config.clone() },
+            None => config.clone(),
+        }
     }
 
     /// What turns its frames into motion.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use egomotion::estimate::Tolerance;
 use egomotion::geometry::{RigidMotion, StereoRig};
 use egomotion::pipeline::rgbd::DepthNoise;
 use nalgebra::Matrix3;
@@ -95,6 +96,8 @@ impl Version {
         let sensor = DepthSensor { noise: DepthNoise::exact(), levels_per_m: 1.0, lens: None };
         let sequence = Sequence {
             depth_sensor: has_depth.then_some(sensor),
+            // The set gives a focal length by its field of view, 90°; its depth images say 320.5 px where that says 320.
+            tolerance: Tolerance { scale: 0.0, ..Tolerance::rendered() },
             ..Sequence::new(name, frames, Clock::Assumed { interval_s: INTERVAL_S }, Some(rig))
         };
         Ok((self.layout, format!("it holds image_{camera} with files named NUMBER_{camera}"), vec![sequence]))

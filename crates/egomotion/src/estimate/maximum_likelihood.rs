@@ -60,6 +60,9 @@ pub struct MaximumLikelihood {
     pub cost: f64,
     /// How φ̂ answers to errors that all observations share; `None` where some direction is not determined.
     pub common: Option<CommonErrors>,
+    /// How residuals were weighed, in units of the squared scale.
+    pub(super) mixture: Mixture,
+    pub(super) scale2: f64,
 }
 
 /// Maximise the likelihood from a start.
@@ -248,6 +251,8 @@ fn finish(
         },
         cost: whole.square,
         common: CommonErrors::of(whole),
+        mixture: found.mixture,
+        scale2: found.scale2,
     })
 }
 

@@ -21,6 +21,11 @@ impl<'a> At<'a> {
     pub fn new(phi: Twist, rig: &'a StereoRig) -> Self {
         Self { motion: phi.exp(), phi, rig }
     }
+
+    /// The rig.
+    pub(super) fn rig(&self) -> &'a StereoRig {
+        self.rig
+    }
 }
 
 /// Misclosure e of an observation, the inverse of its covariance S, and how e changes.
@@ -100,6 +105,27 @@ fn restraint(square: f64) -> f64 {
     if square > MOST_PULL * MOST_PULL { MOST_PULL / square.sqrt() } else { 1.0 }
 }
 
+/// Where the motion leads a structure (x, y, d), and how that changes with the structure; `None` behind the camera.
+#[inline(always)]
+pub(super) fn led(s: &Vector3<f64>, at: &At<'_>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+    let point = at.rig.point(s)?;
+    let (turn, from) = (&at.motion.rotation, &at.motion.translation);
+    let moved = at.motion.apply(&point);
+    let predicted = at.rig.project(&moved)?;
+    // (X, Y, Z) is (x, y, f) b/d.
+    let k = at.rig.baseline_m / s.z;
+    let column = |x: f64, y: f64, z: f64| at.rig.projected_change(&moved, &Vector3::new(x, y, z)).into();
+    let by_structure = Matrix3::from_data(ArrayStorage([
+        column(turn.m11 * k, turn.m21 * k, turn.m31 * k),
+        column(turn.m12 * k, turn.m22 * k, turn.m32 * k),
+        {
+            let per_px = -s.z.recip();
+            column((moved.x - from.x) * per_px, (moved.y - from.y) * per_px, (moved.z - from.z) * per_px)
+        },
+    ]));
+    Some((predicted, by_structure))
+}
+
 impl Measurement for StereoTrack {
     fn position(&self) -> (f64, f64) {
         (self.before.mean.x, self.before.mean.y)
@@ -111,21 +137,7 @@ impl Measurement for StereoTrack {
 
     #[inline(always)]
     fn linearise(&self, s: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised> {
-        let point = at.rig.point(s)?;
-        let (turn, from) = (&at.motion.rotation, &at.motion.translation);
-        let moved = at.motion.apply(&point);
-        let predicted = at.rig.project(&moved)?;
-        // (X, Y, Z) is (x, y, f) b/d.
-        let k = at.rig.baseline_m / s.z;
-        let column = |x: f64, y: f64, z: f64| at.rig.projected_change(&moved, &Vector3::new(x, y, z)).into();
-        let by_structure = Matrix3::from_data(ArrayStorage([
-            column(turn.m11 * k, turn.m21 * k, turn.m31 * k),
-            column(turn.m12 * k, turn.m22 * k, turn.m32 * k),
-            {
-                let per_px = -s.z.recip();
-                column((moved.x - from.x) * per_px, (moved.y - from.y) * per_px, (moved.z - from.z) * per_px)
-            },
-        ]));
+        let (predicted, by_structure) = led(s, at)?;
         let misclosure = self.after.mean - predicted - product(&by_structure, &(self.before.mean - *s));
         let gain = product(&self.before.cov, &by_structure.transpose());
         let mut cov = self.after.cov;

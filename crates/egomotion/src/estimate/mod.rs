@@ -4,6 +4,7 @@ pub mod alignment;
 mod array;
 pub mod blocks;
 pub mod errors_in_variables;
+pub mod joint;
 pub mod least_squares;
 pub mod lmeds;
 pub mod m_estimator;
@@ -16,6 +17,7 @@ pub mod robust_start;
 pub mod row;
 mod step;
 pub mod systematic;
+pub mod tolerance;
 pub mod two_step;
 pub mod undetermined;
 
@@ -28,6 +30,7 @@ use crate::geometry::{Gaussian, Twist};
 pub use blocks::Blocks;
 pub use observability::Observability;
 pub use row::{NormalEquations, Row};
+pub use tolerance::Tolerance;
 pub use undetermined::{FreeMotion, Undetermined};
 
 /// The answer of an estimator of N unknowns.
@@ -62,6 +65,12 @@ impl MotionEstimate {
     /// φ̂.
     pub fn phi(&self) -> Twist {
         Twist::from_vector(&self.theta.mean)
+    }
+
+    /// How far φ̂ is from another motion, in standard deviations of the component that is furthest.
+    pub fn moved_from(&self, other: &Twist) -> f64 {
+        let step = self.theta.mean - other.vector();
+        (0..6).map(|i| (step[i] / self.theta.sigma(i)).abs()).fold(0.0, f64::max)
     }
 
     /// The estimate with every component unobserved that has no finite variance.

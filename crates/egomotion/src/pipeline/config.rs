@@ -4,6 +4,7 @@ use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::estimate::Tolerance;
 use crate::estimate::lmeds::LmedsOptions;
 use crate::estimate::m_estimator::StudentT;
 use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
@@ -82,6 +83,8 @@ pub struct Config {
     pub block_px: f64,
     /// Dense observations are taken from every n-th pixel in both directions.
     pub sample_step_px: usize,
+    /// How well the sensor is known, for method `ml`; all zero: a depth camera's is that of its kind, a stereo rig is exact.
+    pub tolerance: Tolerance,
     /// What the vehicle sweeps.
     pub window: VehicleWindow,
     /// Corners and their tracks.
@@ -108,6 +111,7 @@ impl Default for Config {
             seed: 1,
             block_px: 48.0,
             sample_step_px: 3,
+            tolerance: Tolerance::default(),
             window: VehicleWindow::default(),
             tracks: TrackOptions::default(),
             disparity: DisparityOptions::default(),
@@ -126,6 +130,7 @@ pub fn meaning(path: &[&str]) -> Option<&'static str> {
     }
     match path {
         [name] => of::<Config>(name),
+        ["tolerance", name] => of::<Tolerance>(name),
         ["window", name] => of::<VehicleWindow>(name),
         ["tracks", name] => of::<TrackOptions>(name),
         ["disparity", name] => of::<DisparityOptions>(name),
@@ -229,6 +234,7 @@ impl Config {
                 ml.phase_error_px.is_finite() && ml.phase_error_px >= 0.0,
                 "maximum_likelihood.phase_error_px must not be negative",
             ),
+            (self.tolerance.is_valid(), "tolerance: each must be finite and not negative"),
             (
                 self.window.left_m < self.window.right_m && self.window.top_m < self.window.bottom_m,
                 "window: left_m must be less than right_m, top_m less than bottom_m",

@@ -11,6 +11,7 @@ use super::solve::{Observed, solve};
 use super::stereo::StageTimes;
 use super::track_solver::TrackSolver;
 use super::unanswered::Unanswered;
+use crate::estimate::tolerance::Sensor;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Grid, StereoRig, Twist};
 use crate::motion::obstacle::{Belief, NoObstacle, Obstacle, nearest};
@@ -138,7 +139,8 @@ impl FramePair<'_> {
     }
 
     fn solver(&self) -> TrackSolver<'_> {
-        TrackSolver { rig: self.rig, config: self.config, dt_s: self.dt_s() }
+        let by = if self.hints(None).given.is_some() { Sensor::Image } else { Sensor::Stereo };
+        TrackSolver { rig: self.rig, config: self.config, dt_s: self.dt_s(), by }
     }
 
     fn dense(
@@ -189,10 +191,11 @@ impl FramePair<'_> {
             shaped && (self.config.method, self.config.approach) == (Method::Ml, Approach::Discrete);
         let motion = timed(&mut stages.estimate_ms, || {
             if by_shape {
-                return solve_with_shape(&pair, tracks, rough.as_ref().ok(), self.config)?.known();
+                return solve_with_shape(&pair, tracks, rough.as_ref().ok(), self.config, self.dt_s())?
+                    .known();
             }
             let start = rough.unwrap_or_else(|_| Twist::zero());
-            solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config)
+            solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config, self.dt_s())
         });
         let rows = row_disagreement(&self.before.images, tracks, self.rig);
         let (maps, obstacle, moving) = timed(&mut stages.maps_ms, || {

@@ -11,6 +11,7 @@ use super::config::Config;
 use super::frame::Frame;
 use super::stereo::{FrameMotion, PipelineError, StereoMotion};
 use super::unanswered::Unanswered;
+use crate::estimate::Tolerance;
 use crate::geometry::{Field, Grid, Image, StereoRig};
 use crate::observe::DisparityMap;
 
@@ -65,6 +66,27 @@ impl DepthNoise {
     /// Of rendered depth.
     pub fn exact() -> Self {
         Self::Exact { relative: 1e-4 }
+    }
+
+    /// How well a sensor of the kind is known, apart from its noise.
+    ///
+    /// Of a sensor that one holds in the hand: calibrations of focal lengths repeat to some thousandths and those of
+    /// principal points to a pixel, depth of Kinects differs by up to a percent from one to the next; colour cameras
+    /// have rolling shutters and take most of a frame to read, and are not triggered with depth.
+    pub fn tolerance(&self) -> Tolerance {
+        let hand_held =
+            Tolerance { focal: 2e-3, centre_px: 1.0, scale: 5e-3, readout_s: 0.03, delay_s: 5e-3 };
+        match self {
+            Self::StructuredLight { .. } | Self::Stereo { .. } => hand_held,
+            Self::TimeOfFlight { .. } => Tolerance { scale: 2e-3, delay_s: 2e-3, ..hand_held },
+            Self::Exact { .. } => Tolerance::rendered(),
+        }
+    }
+
+    /// The choices of a run, with the tolerance of this kind unless they have one.
+    pub fn tolerated(&self, config: Config) -> Config {
+        let own = config.tolerance;
+        Config { tolerance: if own.is_exact() { self.tolerance() } else { own }, ..config }
     }
 
     /// σ_Z of a depth, both in metres.
@@ -126,7 +148,7 @@ impl RgbdMotion {
     /// # Errors
     /// [`PipelineError`] when the camera cannot measure or the choices do not fit together.
     pub fn new(camera: DepthCamera, config: Config) -> Result<Self, PipelineError> {
-        Ok(Self { motion: StereoMotion::new(camera.rig, config)?, camera })
+        Ok(Self { motion: StereoMotion::new(camera.rig, camera.noise.tolerated(config))?, camera })
     }
 
     /// The motion from the last good frame to this one; depth in metres, on the image's pixels.

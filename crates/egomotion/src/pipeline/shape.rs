@@ -9,15 +9,16 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::config::Config;
-use super::solve::Solver;
+use super::solve::{SETTLED, Solver};
+use crate::estimate::m_estimator::StudentT;
+use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
+use crate::estimate::tolerance::{Sensed, Sensor, SensorErrors};
 use crate::estimate::{MotionEstimate, Unsolvable, median};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::{DensePair, StereoTrack};
 
 /// Most times that the shape is looked at again from where the last motion leads.
 const ROUNDS: usize = 10;
-/// Shape is settled when φ moves by less than this, in its standard deviations.
-const SETTLED: f64 = 0.1;
 /// Disparities further from the prediction than this are of another surface, in pixels: at first without any motion
 /// to start from, and in the end.
 const OTHER_SURFACE_PX: (f64, f64) = (8.0, 1.0);
@@ -38,25 +39,35 @@ pub(super) fn solve_with_shape(
     corners: &[StereoTrack],
     start: Option<&Twist>,
     config: &Config,
+    dt_s: f64,
 ) -> Result<MotionEstimate, Unsolvable> {
+    // The mixture takes every residual as one in three dimensions; shape has one, beside which places would look like outliers.
+    let config =
+        &Config { maximum_likelihood: without_mixture(&config.maximum_likelihood), ..config.clone() };
     let tracked = Tracked { flow: pair.every(config.sample_step_px, DensePair::stereo_track), corners };
     let mut phi = start.copied().unwrap_or_else(Twist::zero);
     let mut reach = if start.is_some() { OTHER_SURFACE_PX.1 } else { OTHER_SURFACE_PX.0 };
+    let mut errors = SensorErrors::none();
     let mut round = 0;
     loop {
-        let motion = phi.exp();
-        let all = observations(pair, &tracked, &motion, reach, config);
-        let found = Solver::new(pair.rig, &phi, config).likelihood(&all)?;
-        let step = found.phi().vector() - phi.vector();
-        let moved = (0..6).map(|i| (step[i] / found.theta.sigma(i)).abs()).fold(0.0, f64::max);
+        let near = reach <= OTHER_SURFACE_PX.1;
+        let all = observations(pair, &tracked, &phi, &errors, reach, config);
+        let solver = Solver::new(pair.rig, &phi, config);
+        // Far from the answer it is not the sensor that is wrong.
+        let solver = if near { solver.over(dt_s) } else { solver };
+        let found = solver.round(&all, &mut errors)?;
+        let moved = found.moved_from(&phi);
         phi = found.phi();
         round += 1;
-        let near = reach <= OTHER_SURFACE_PX.1;
         if (near && moved.is_finite() && moved < SETTLED) || round == ROUNDS {
             return Ok(found);
         }
         reach = (0.5 * reach).max(OTHER_SURFACE_PX.1);
     }
+}
+
+fn without_mixture(options: &MaximumLikelihoodOptions) -> MaximumLikelihoodOptions {
+    MaximumLikelihoodOptions { kernel: StudentT { fitted: false, ..options.kernel }, ..*options }
 }
 
 /// Points whose places were found in both images.
@@ -69,25 +80,31 @@ struct Tracked<'a> {
 fn observations(
     pair: &DensePair<'_>,
     tracked: &Tracked<'_>,
-    motion: &RigidMotion,
+    phi: &Twist,
+    errors: &SensorErrors,
     reach_px: f64,
     config: &Config,
-) -> Vec<StereoTrack> {
+) -> Vec<Sensed> {
+    let (rig, motion, seen_by_depth) = (pair.rig, &phi.exp(), errors.apart.exp().after(&phi.exp()));
+    let corrected = |track: StereoTrack, by| errors.corrected(&Sensed { track, by }, rig);
     let shapes = pair.every(config.sample_step_px, |pair, u, v| {
-        let track = pair.shape_track(u, v, motion, reach_px)?;
-        Some((track, pair.flow.get(u, v).is_some()))
+        let track = pair.shape_track(u, v, &seen_by_depth, reach_px)?;
+        Some((corrected(track, Sensor::Depth), pair.flow.get(u, v).is_some()))
     });
-    let squares = shapes.iter().filter_map(|(track, _)| across_surface(track, pair.rig, motion));
+    let squares = shapes.iter().filter_map(|(shape, _)| across_surface(&shape.track, rig, motion));
     let disparity = factor(squares.collect(), MEDIAN_1);
-    let place = |tracks: &[StereoTrack]| {
-        let squares = tracks.iter().filter_map(|track| along_surface(track, pair.rig, motion));
-        factor(squares.collect(), MEDIAN_2)
+    let placed = |tracks: &[StereoTrack], overlap: f64| {
+        let mut tracks: Vec<Sensed> = tracks.iter().map(|&track| corrected(track, Sensor::Image)).collect();
+        let squares = tracks.iter().filter_map(|sensed| along_surface(&sensed.track, rig, motion));
+        let place = factor(squares.collect(), MEDIAN_2) * overlap;
+        tracks.iter_mut().for_each(|sensed| sensed.track = scaled(&sensed.track, place, disparity));
+        tracks
     };
-    let (by_flow, by_corners) = (place(&tracked.flow) * overlap(config), place(tracked.corners));
-    let flow = tracked.flow.iter().map(|track| scaled(track, by_flow, disparity));
-    let corners = tracked.corners.iter().map(|track| scaled(track, by_corners, disparity));
-    let elsewhere = shapes.iter().filter(|(_, tracked)| !tracked);
-    flow.chain(corners).chain(elsewhere.map(|(track, _)| scaled(track, 1.0, disparity))).collect()
+    let mut all = placed(&tracked.flow, overlap(config));
+    all.extend(placed(tracked.corners, 1.0));
+    let elsewhere = shapes.into_iter().filter(|(_, tracked)| !tracked);
+    all.extend(elsewhere.map(|(shape, _)| Sensed { track: scaled(&shape.track, 1.0, disparity), ..shape }));
+    all
 }
 
 /// How many of the sampled pixels share the error of one pixel's flow.

@@ -4,26 +4,29 @@ use super::config::{Approach, Config, EstimatorKind, Method};
 use crate::constrain::{binocular_flow, dcce, image_flow};
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
 use crate::estimate::errors_in_variables::errors_in_variables;
+use crate::estimate::joint::joint_step;
 use crate::estimate::least_squares::{Weighting, least_squares};
 use crate::estimate::lmeds::{LmedsOptions, lmeds};
 use crate::estimate::m_estimator::m_estimate;
-use crate::estimate::maximum_likelihood::maximum_likelihood;
+use crate::estimate::maximum_likelihood::{MaximumLikelihood, maximum_likelihood};
 use crate::estimate::measurement::Measurement;
+use crate::estimate::tolerance::{Sensed, Sensor, SensorErrors, SensorPrior};
 use crate::estimate::two_step::two_step;
-use crate::estimate::{Blocks, Fit, MotionEstimate, Row, Unsolvable};
+use crate::estimate::{Blocks, Fit, MotionEstimate, Row, Tolerance, Unsolvable};
 use crate::geometry::{StereoRig, Twist};
 use crate::observe::{DensePair, DepthChange, StereoFlow, StereoTrack};
+use nalgebra::Matrix6;
 
 /// Where the observations of a frame pair come from.
 #[derive(Debug, Clone, Copy)]
 pub enum Observed<'a> {
-    /// Tracked corners.
-    Sparse(&'a [StereoTrack]),
+    /// Tracked corners, and what saw them.
+    Sparse(&'a [StereoTrack], Sensor),
     /// Dense fields, of which every `sample_step_px`-th pixel is used.
     Dense(DensePair<'a>, &'a [StereoTrack]),
 }
 
-/// φ by the configured method; rows and robust weights start from `start`.
+/// φ over `dt_s` seconds by the configured method; rows and robust weights start from `start`.
 ///
 /// # Errors
 /// [`Unsolvable`] when the observations do not determine a motion.
@@ -32,10 +35,11 @@ pub fn solve(
     rig: &StereoRig,
     start: &Twist,
     config: &Config,
+    dt_s: f64,
 ) -> Result<MotionEstimate, Unsolvable> {
-    let solver = Solver::new(rig, start, config);
+    let solver = Solver::new(rig, start, config).over(dt_s);
     let found = match (config.method, config.approach) {
-        (Method::Ml, Approach::Discrete) => solver.likelihood(&solver.tracks(observed)),
+        (Method::Ml, Approach::Discrete) => solver.sensed(&solver.tracks(observed), observed.by()),
         (Method::Ml, Approach::Differential) => solver.likelihood(&solver.flows(observed)),
         (Method::Dcce, _) => solver.depth_change(&solver.depth_changes(observed)),
         (Method::Dv, _) => solver.binocular(&solver.flows(observed)),
@@ -46,6 +50,22 @@ pub fn solve(
     found?.known()
 }
 
+impl Observed<'_> {
+    /// What made the tracks.
+    fn by(&self) -> Sensor {
+        match self {
+            Observed::Sparse(_, by) => *by,
+            Observed::Dense(pair, _) if pair.given => Sensor::Image,
+            Observed::Dense(..) => Sensor::Stereo,
+        }
+    }
+}
+
+/// The sensor's errors are looked at again so often at most,
+const ROUNDS: usize = 5;
+/// until φ moves by less than this, in its standard deviations.
+pub(super) const SETTLED: f64 = 0.1;
+
 /// The methods on observations at hand, each with the configured estimator.
 #[derive(Debug, Clone, Copy)]
 pub struct Solver<'a> {
@@ -53,17 +73,24 @@ pub struct Solver<'a> {
     start: &'a Twist,
     config: &'a Config,
     blocks: Blocks,
+    prior: SensorPrior,
 }
 
 impl<'a> Solver<'a> {
     /// Rows get their σ, and iterations their start, at the motion `start`.
     pub fn new(rig: &'a StereoRig, start: &'a Twist, config: &'a Config) -> Self {
-        Self { rig, start, config, blocks: Blocks::over(rig, config.block_px) }
+        let exact = Tolerance::default().over(0.0);
+        Self { rig, start, config, blocks: Blocks::over(rig, config.block_px), prior: exact }
+    }
+
+    /// The same for an interval of `dt_s` seconds, with the tolerance of the sensor.
+    pub fn over(self, dt_s: f64) -> Self {
+        Self { prior: self.config.tolerance.over(dt_s), ..self }
     }
 
     fn tracks(&self, observed: &Observed<'_>) -> Vec<StereoTrack> {
         match observed {
-            Observed::Sparse(tracks) => tracks.to_vec(),
+            Observed::Sparse(tracks, _) => tracks.to_vec(),
             Observed::Dense(pair, tracks) => {
                 let mut all = pair.every(self.config.sample_step_px, DensePair::stereo_track);
                 all.extend_from_slice(tracks);
@@ -87,7 +114,7 @@ impl<'a> Solver<'a> {
         let bf = self.rig.depth_disparity_product();
         let step = self.config.sample_step_px;
         match (observed, self.config.approach) {
-            (Observed::Sparse(_), _) => Vec::new(),
+            (Observed::Sparse(..), _) => Vec::new(),
             (Observed::Dense(pair, _), Approach::Discrete) => {
                 pair.every(step, |pair, u, v| Some(pair.depth_track(u, v)?.depth_change(bf)))
             }
@@ -123,11 +150,56 @@ impl<'a> Solver<'a> {
         let blocks = Some(&self.blocks);
         let found = maximum_likelihood(observations, self.rig, self.start, blocks, &options.kernel)?;
         let mut motion = found.motion;
-        if motion.theta.cov.iter().all(|v| v.is_finite())
-            && let Some(common) = found.common
-        {
-            motion.theta.cov += common.phase_covariance(options.phase_error_px);
+        motion.theta.cov += self.phase(&found);
+        Ok(motion)
+    }
+
+    /// What the phase error adds to a covariance.
+    fn phase(&self, found: &MaximumLikelihood) -> Matrix6<f64> {
+        let known = found.motion.theta.cov.iter().all(|v| v.is_finite());
+        let sigma_px = self.config.maximum_likelihood.phase_error_px;
+        let common = found.common.filter(|_| known);
+        common.map_or_else(Matrix6::zeros, |common| common.phase_covariance(sigma_px))
+    }
+
+    /// Maximum likelihood of tracks that a sensor made which is known only so well.
+    fn sensed(&self, tracks: &[StereoTrack], by: Sensor) -> Result<MotionEstimate, Unsolvable> {
+        let (mut errors, mut start) = (SensorErrors::none(), *self.start);
+        let mut round = 0;
+        loop {
+            let made = tracks.iter().map(|&track| Sensed { track, by });
+            let corrected: Vec<Sensed> = made.map(|sensed| errors.corrected(&sensed, self.rig)).collect();
+            let found = Solver { start: &start, ..*self }.round(&corrected, &mut errors)?;
+            let moved = found.moved_from(&start);
+            start = found.phi();
+            round += 1;
+            if self.prior.is_exact() || moved < SETTLED || round == ROUNDS {
+                return Ok(found);
+            }
         }
+    }
+
+    /// Maximum likelihood of observations from which `errors` are taken, and a step towards the most likely errors.
+    pub(super) fn round(
+        &self,
+        corrected: &[Sensed],
+        errors: &mut SensorErrors,
+    ) -> Result<MotionEstimate, Unsolvable> {
+        let tracks: Vec<StereoTrack> = corrected.iter().map(|sensed| sensed.track).collect();
+        let kernel = &self.config.maximum_likelihood.kernel;
+        let blocks = &self.blocks;
+        let found = maximum_likelihood(&tracks, self.rig, self.start, Some(blocks), kernel)?;
+        let (phase, mut motion) = (self.phase(&found), found.motion);
+        let joint = match self.prior.is_exact() {
+            true => None,
+            false => joint_step(corrected, self.rig, &found, errors, &self.prior, blocks),
+        };
+        if let Some(joint) = joint {
+            motion.theta.mean += joint.step;
+            motion.theta.cov = joint.cov;
+            *errors = joint.errors;
+        }
+        motion.theta.cov += phase;
         Ok(motion)
     }
 

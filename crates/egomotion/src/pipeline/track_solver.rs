@@ -10,6 +10,7 @@ use super::unanswered::Unanswered;
 use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
 use crate::estimate::robust_start::robust_start;
 use crate::estimate::systematic::common_errors;
+use crate::estimate::tolerance::Sensor;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{StereoRig, Twist};
 use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
@@ -29,6 +30,8 @@ pub(super) struct TrackSolver<'a> {
     pub(super) rig: &'a StereoRig,
     pub(super) config: &'a Config,
     pub(super) dt_s: f64,
+    /// What makes the tracks.
+    pub(super) by: Sensor,
 }
 
 impl<'a> TrackSolver<'a> {
@@ -58,7 +61,7 @@ impl<'a> TrackSolver<'a> {
         stages: &mut StageTimes,
     ) -> PairResult {
         let motion = timed(&mut stages.estimate_ms, || {
-            solve(&Observed::Sparse(tracks), self.rig, &rough?, self.config)
+            solve(&Observed::Sparse(tracks, self.by), self.rig, &rough?, self.config, self.dt_s)
         });
         let rigid = self.rigid(tracks, motion.as_ref().ok(), row_disagreement_px);
         let obstacle = rigid.ok_or(NoObstacle::NothingMeasured).and_then(|rigid| {

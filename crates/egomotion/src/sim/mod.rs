@@ -4,6 +4,7 @@
 //! poses together. The world's frame is that of the cyclopean camera at time 0: X right, Y down, Z forward.
 
 pub mod blur;
+pub mod depth_sensing;
 pub mod noise;
 pub mod render;
 pub mod scene;
@@ -14,6 +15,7 @@ pub mod texture;
 pub mod truth;
 pub mod truth_maps;
 
+pub use depth_sensing::{DepthPrinciple, DepthSensing};
 pub use noise::{SensorError, SensorNoise};
 pub use render::{StereoImages, View};
 pub use scene::{Hit, Part, Scene};

@@ -4,6 +4,7 @@
 //! are independent and nothing repeats.
 
 mod by_sigma;
+mod depth;
 mod figures;
 mod pair;
 mod verdict;
@@ -19,10 +20,21 @@ use super::{Cell, Publication, Study, Table};
 use crate::pipeline::Observe;
 use crate::pipeline::stereo::PipelineError;
 use crate::sim::Sequence;
+pub use depth::DepthKind;
 use pair::Pair;
 
 /// Pairs that one part takes.
 const PAIRS_PER_PART: usize = 10;
+
+/// What takes a pair of frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sensor {
+    /// A stereo rig, whose calibration is exact.
+    Stereo,
+    /// A depth camera, whose calibration and shutter err as its tolerance says.
+    Depth(DepthKind),
+}
 
 /// The whole pipeline on random pairs of named sequences.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -34,6 +46,8 @@ pub struct Consistency {
     pub width_px: usize,
     /// Height of the images, in pixels.
     pub height_px: usize,
+    /// What takes the pairs.
+    pub sensor: Sensor,
     /// What is measured in the images; `Sparse` gives no maps.
     pub observe: Observe,
     /// Pairs of each sequence.
@@ -49,6 +63,7 @@ impl Default for Consistency {
             sequences: paper.chain(Sequence::lab_names()).map(str::to_owned).collect(),
             width_px: 320,
             height_px: 240,
+            sensor: Sensor::Stereo,
             observe: Observe::Dense,
             pairs: 50,
             seed: 1,
@@ -125,7 +140,7 @@ impl Study for Consistency {
         let sequence = self.sequence(name)?;
         (start..(start + PAIRS_PER_PART).min(self.pairs))
             .into_par_iter()
-            .map(|pair| Ok(Pair::new(&sequence, pair, self.seed).judge(self.observe)?))
+            .map(|pair| Ok(Pair::new(&sequence, pair, self.seed).judge(self.sensor, self.observe)?))
             .collect()
     }
 

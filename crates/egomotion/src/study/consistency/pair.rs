@@ -4,10 +4,11 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use super::{BySigma, Record};
+use super::depth::Camera;
+use super::{BySigma, Record, Sensor};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::pipeline::stereo::{DenseResults, PipelineError};
-use crate::pipeline::{Config, Observe, StereoFrame, StereoMotion};
+use crate::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion};
 use crate::sim::{Scene, SensorNoise, Sequence, View};
 
 /// How far a pose may lie from the sequence's own, in metres and degrees along and about each axis.
@@ -56,6 +57,14 @@ impl<'a> Pair<'a> {
         View::new(&self.scene, &self.sequence.rig, self.poses[k])
     }
 
+    /// What stereo says of it.
+    fn by_stereo(&self, observe: Observe) -> Result<FrameMotion, PipelineError> {
+        let config = Config { observe, ..Config::default() };
+        let mut motion = StereoMotion::new(self.sequence.rig, config)?;
+        motion.push(self.frame(0));
+        Ok(motion.push(self.frame(1)))
+    }
+
     fn frame(&self, k: usize) -> StereoFrame {
         let noise = SensorNoise::default().with_seed(self.seed);
         let seen = noise.expose(&self.view(k).render(RAYS), k as u64);
@@ -63,11 +72,14 @@ impl<'a> Pair<'a> {
     }
 
     /// Run the pipeline, and compare.
-    pub(super) fn judge(&self, observe: Observe) -> Result<Record, PipelineError> {
+    pub(super) fn judge(&self, sensor: Sensor, observe: Observe) -> Result<Record, PipelineError> {
         let rig = self.sequence.rig;
-        let mut motion = StereoMotion::new(rig, Config { observe, ..Config::default() })?;
-        motion.push(self.frame(0));
-        let answer = motion.push(self.frame(1));
+        let answer = match sensor {
+            Sensor::Stereo => self.by_stereo(observe)?,
+            Sensor::Depth(kind) => {
+                Camera::new(kind, &self.scene, &rig, self.seed).answer(self.poses[0], &self.phi, observe)?
+            }
+        };
         let phi = self.phi.seen_from(&rig.left_from_cyclopean());
         let mut record = Record {
             sequence: self.sequence.name.clone(),
