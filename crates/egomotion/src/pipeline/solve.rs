@@ -164,6 +164,9 @@ impl<'a> Solver<'a> {
 
     /// Maximum likelihood of tracks that a sensor made which is known only so well.
     fn sensed(&self, tracks: &[StereoTrack], by: Sensor) -> Result<MotionEstimate, Unsolvable> {
+        if self.prior.is_exact() {
+            return self.likelihood(tracks);
+        }
         let (mut errors, mut start) = (SensorErrors::none(), *self.start);
         let mut round = 0;
         loop {
@@ -173,7 +176,7 @@ impl<'a> Solver<'a> {
             let moved = found.moved_from(&start);
             start = found.phi();
             round += 1;
-            if self.prior.is_exact() || moved < SETTLED || round == ROUNDS {
+            if moved < SETTLED || round == ROUNDS {
                 return Ok(found);
             }
         }
