@@ -154,10 +154,9 @@ fn errors(name: &str, options: &[&str]) -> Option<(f64, f64)> {
 }
 
 /// Bounds: DIFODO's (range flow), 2.2 mm and .38°, 3.7 mm and .50°; most of the rotation is the truth's own noise.
-/// The aim for rpy, 3.5 mm, is missed by .04 mm.
 #[test]
 fn a_depth_camera_tum() {
-    for (name, t_mm, r_deg) in [("freiburg1_desk", 2.2, 0.38), ("freiburg1_rpy", 3.7, 0.50)] {
+    for (name, t_mm, r_deg) in [("freiburg1_desk", 2.2, 0.38), ("freiburg1_rpy", 3.5, 0.46)] {
         let Some((t, r)) = errors(&format!("tum_rgbd/{name}"), &["--quiet"]) else { continue };
         assert!(t <= t_mm && r <= r_deg, "{name}: {t} mm, {r}°");
     }
