@@ -176,7 +176,7 @@ pub struct RealArgs {
 #[derive(Debug, Clone, Args)]
 pub struct ConsistencyArgs {
     /// The sequences, such as C,drive,lab-A [default: A, B, C, drive and lab-A … lab-M].
-    #[arg(long, value_name = "NAME,…", value_delimiter = ',', value_parser = any_name)]
+    #[arg(long = "sequence", alias = "sequences", value_name = "NAME,…", value_delimiter = ',', value_parser = any_name)]
     pub sequences: Option<Vec<String>>,
     /// Size of the rendered images.
     #[arg(long, value_name = "WxH", default_value = "320x240", value_parser = size)]
