@@ -6,22 +6,32 @@ use nalgebra::{SMatrix, SVector};
 use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 /// Two arrays (H, W).
 pub type Two<'py, T> = (Bound<'py, PyArray2<T>>, Bound<'py, PyArray2<T>>);
 
-/// What NumPy makes of an argument, in C order and aligned: without a copy where it is so already.
-fn contiguous<'py>(argument: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-    let numpy = argument.py().import("numpy")?;
-    let array = numpy.call_method1("asarray", (argument,))?;
-    numpy.call_method1("require", (array, argument.py().None(), ["C_CONTIGUOUS", "ALIGNED"]))
+/// What NumPy makes of an argument, without a copy where that is possible; what gives only DLPack goes in too.
+fn array<'py>(argument: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let only_dlpack = argument.hasattr("__dlpack__")? && !argument.hasattr("__array__")?;
+    let how = if only_dlpack { "from_dlpack" } else { "asarray" };
+    argument.py().import("numpy")?.call_method1(how, (argument,))
 }
 
-/// The shape and values of an array of one type; `None` if it is of another.
-fn values<T: Element + Copy>(array: &Bound<'_, PyAny>) -> PyResult<Option<(Vec<usize>, Vec<T>)>> {
+/// In C order and aligned: without a copy where it is so already.
+fn contiguous<'py>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = array.py();
+    py.import("numpy")?.call_method1("require", (array, py.None(), ["C_CONTIGUOUS", "ALIGNED"]))
+}
+
+/// What is made of the shape and values of an array of one type, which are not copied; `None` if it is of another.
+fn values<T: Element, R>(
+    array: &Bound<'_, PyAny>,
+    take: impl FnOnce(&[usize], &[T]) -> PyResult<R>,
+) -> PyResult<Option<R>> {
     let Ok(array) = array.cast::<PyArrayDyn<T>>() else { return Ok(None) };
     let values = array.try_readonly()?;
-    Ok(Some((array.shape().to_vec(), values.as_slice()?.to_vec())))
+    take(array.shape(), values.as_slice()?).map(Some)
 }
 
 fn wrong_type(name: &str, array: &Bound<'_, PyAny>, wanted: &str) -> PyErr {
@@ -36,17 +46,15 @@ fn wrong_shape(name: &str, found: &[usize], wanted: &str) -> PyErr {
 /// Grey levels 0 … 255 of an image, as those of files: (H, W), or colours (H, W, 3) or (H, W, 4) as red, green, blue; uint8, uint16 (0 … 65535) or
 /// float32.
 pub fn image(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Image> {
-    let array = contiguous(argument)?;
-    if let Some((shape, levels)) = values::<u8>(&array)? {
-        return grey(name, &shape, &levels, 1.0);
+    let array = contiguous(&array(argument)?)?;
+    if let Some(image) = values(&array, |shape, levels: &[u8]| grey(name, shape, levels, 1.0))? {
+        return Ok(image);
     }
-    if let Some((shape, levels)) = values::<u16>(&array)? {
-        return grey(name, &shape, &levels, WIDE);
+    if let Some(image) = values(&array, |shape, levels: &[u16]| grey(name, shape, levels, WIDE))? {
+        return Ok(image);
     }
-    if let Some((shape, levels)) = values::<f32>(&array)? {
-        return grey(name, &shape, &levels, 1.0);
-    }
-    Err(wrong_type(name, &array, "uint8, uint16 or float32"))
+    let image = values(&array, |shape, levels: &[f32]| grey(name, shape, levels, 1.0))?;
+    image.ok_or_else(|| wrong_type(name, &array, "uint8, uint16 or float32"))
 }
 
 fn grey<T: Copy + Into<f32>>(name: &str, shape: &[usize], levels: &[T], unit: f32) -> PyResult<Image> {
@@ -68,75 +76,83 @@ fn grey<T: Copy + Into<f32>>(name: &str, shape: &[usize], levels: &[T], unit: f3
 
 /// A plane (H, W) of float32 or float64 whose missing pixels are NaN.
 pub fn field(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Field> {
-    let array = contiguous(argument)?;
-    let (shape, levels) = match values::<f32>(&array)? {
-        Some(found) => found,
-        None => match values::<f64>(&array)? {
-            Some((shape, levels)) => (shape, levels.iter().map(|&level| level as f32).collect()),
-            None => return Err(wrong_type(name, &array, "float32 with NaN where it is unknown")),
-        },
-    };
-    let wanted = "(height, width), not empty";
-    let [height, width] = shape[..] else { return Err(wrong_shape(name, &shape, wanted)) };
-    let grid = Grid::from_values(width, height, levels).filter(|_| width > 0 && height > 0);
-    grid.map(Field::from_grid).ok_or_else(|| wrong_shape(name, &shape, wanted))
+    let array = contiguous(&array(argument)?)?;
+    let single = |shape: &[usize], levels: &[f32]| grid(name, shape, levels.to_vec());
+    if let Some(plane) = values(&array, single)? {
+        return Ok(Field::from_grid(plane));
+    }
+    let double =
+        |shape: &[usize], levels: &[f64]| grid(name, shape, levels.iter().map(|&v| v as f32).collect());
+    let plane = values(&array, double)?;
+    let plane = plane.ok_or_else(|| wrong_type(name, &array, "float32 with NaN where it is unknown"))?;
+    Ok(Field::from_grid(plane))
 }
 
 /// A plane (H, W) of booleans.
 pub fn mask(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Grid<bool>> {
-    let array = contiguous(argument)?;
-    let (shape, values) = values::<bool>(&array)?.ok_or_else(|| wrong_type(name, &array, "bool"))?;
-    let [height, width] = shape[..] else { return Err(wrong_shape(name, &shape, "(height, width)")) };
-    Grid::from_values(width, height, values).ok_or_else(|| wrong_shape(name, &shape, "(height, width)"))
+    let array = contiguous(&array(argument)?)?;
+    let found = values(&array, |shape, values: &[bool]| grid(name, shape, values.to_vec()))?;
+    found.ok_or_else(|| wrong_type(name, &array, "bool"))
 }
 
-/// Numbers of any shape: float64, or what converts to it safely.
-pub fn numbers(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
-    let numpy = argument.py().import("numpy")?;
-    let array = numpy.call_method1("asarray", (argument,))?;
+fn grid<T: Copy>(name: &str, shape: &[usize], values: Vec<T>) -> PyResult<Grid<T>> {
+    let found = match *shape {
+        [height, width] if height > 0 && width > 0 => Grid::from_values(width, height, values),
+        _ => None,
+    };
+    found.ok_or_else(|| wrong_shape(name, shape, "(height, width), not empty"))
+}
+
+/// Numbers of any shape, not copied if they are float64: these, or what converts to them safely.
+pub fn numbers<R>(
+    name: &str,
+    argument: &Bound<'_, PyAny>,
+    take: impl FnOnce(&[usize], &[f64]) -> PyResult<R>,
+) -> PyResult<R> {
+    let array = array(argument)?;
+    let wrong = || wrong_type(name, &array, "float64 or other real numbers");
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if !["f", "i", "u"].contains(&kind.as_str()) {
-        return Err(wrong_type(name, &array, "float64 or other real numbers"));
+        return Err(wrong());
     }
-    let array = contiguous(&array.call_method1("astype", ("float64",))?)?;
-    values::<f64>(&array)?.ok_or_else(|| wrong_type(name, &array, "float64"))
+    let as_they_are = PyDict::new(array.py());
+    as_they_are.set_item("copy", false)?;
+    let doubles = array.call_method("astype", ("float64",), Some(&as_they_are))?;
+    values(&contiguous(&doubles)?, take)?.ok_or_else(wrong)
 }
 
 /// n numbers: (n,).
 pub fn vector(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    let (shape, values) = numbers(name, argument)?;
-    if shape.len() == 1 { Ok(values) } else { Err(wrong_shape(name, &shape, "(n,)")) }
+    numbers(name, argument, |shape, values| match shape {
+        [_] => Ok(values.to_vec()),
+        _ => Err(wrong_shape(name, shape, "(n,)")),
+    })
 }
 
 /// One vector of N numbers: (N,).
 pub fn one<const N: usize>(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<SVector<f64, N>> {
-    let (shape, values) = numbers(name, argument)?;
-    if shape == [N] {
-        Ok(SVector::from_column_slice(&values))
-    } else {
-        Err(wrong_shape(name, &shape, &format!("({N},)")))
-    }
+    numbers(name, argument, |shape, values| match shape {
+        [n] if *n == N => Ok(SVector::from_column_slice(values)),
+        _ => Err(wrong_shape(name, shape, &format!("({N},)"))),
+    })
 }
 
 /// n vectors of N numbers each: (n, N).
 pub fn rows<const N: usize>(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Vec<SVector<f64, N>>> {
-    let (shape, values) = numbers(name, argument)?;
-    match shape[..] {
-        [_, columns] if columns == N => {
+    numbers(name, argument, |shape, values| match shape {
+        [_, columns] if *columns == N => {
             Ok(values.as_chunks::<N>().0.iter().map(|row| SVector::from_column_slice(row)).collect())
         }
-        _ => Err(wrong_shape(name, &shape, &format!("(n, {N})"))),
-    }
+        _ => Err(wrong_shape(name, shape, &format!("(n, {N})"))),
+    })
 }
 
 /// One N × N matrix.
 pub fn matrix<const N: usize>(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<SMatrix<f64, N, N>> {
-    let (shape, values) = numbers(name, argument)?;
-    if shape == [N, N] {
-        Ok(SMatrix::from_row_slice(&values))
-    } else {
-        Err(wrong_shape(name, &shape, &format!("({N}, {N})")))
-    }
+    numbers(name, argument, |shape, values| match shape {
+        [a, b] if *a == N && *b == N => Ok(SMatrix::from_row_slice(values)),
+        _ => Err(wrong_shape(name, shape, &format!("({N}, {N})"))),
+    })
 }
 
 /// Covariances of n vectors of N numbers: whole (n, N, N), or variances (n, N) or (N,).
@@ -145,19 +161,18 @@ pub fn covariances<const N: usize>(
     argument: &Bound<'_, PyAny>,
     n: usize,
 ) -> PyResult<Vec<SMatrix<f64, N, N>>> {
-    let (shape, values) = numbers(name, argument)?;
     let diagonal = |row: &[f64]| SMatrix::from_diagonal(&SVector::<f64, N>::from_column_slice(row));
-    match shape[..] {
-        [rows] if rows == N => Ok(vec![diagonal(&values); n]),
+    numbers(name, argument, |shape, values| match *shape {
+        [rows] if rows == N => Ok(vec![diagonal(values); n]),
         [rows, columns] if rows == n && columns == N => Ok(values.chunks_exact(N).map(diagonal).collect()),
         [rows, a, b] if rows == n && a == N && b == N => {
             Ok(values.chunks_exact(N * N).map(SMatrix::from_row_slice).collect())
         }
         _ => {
             let wanted = format!("variances ({N},) or ({n}, {N}), or covariances ({n}, {N}, {N})");
-            Err(wrong_shape(name, &shape, &wanted))
+            Err(wrong_shape(name, shape, &wanted))
         }
-    }
+    })
 }
 
 /// As many of one thing as of another.

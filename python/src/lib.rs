@@ -4,6 +4,7 @@
 mod alignment;
 mod arrays;
 mod config;
+mod draws;
 mod error;
 mod estimate;
 mod estimators;
@@ -17,6 +18,7 @@ mod pipeline;
 mod recording;
 mod rig;
 mod rows;
+mod signals;
 mod simulate;
 mod study;
 mod world;
@@ -30,6 +32,8 @@ mod _native {
     use crate::alignment::{align, align_phi};
     #[pymodule_export]
     use crate::config::default_config;
+    #[pymodule_export]
+    use crate::draws::{Draw, Draws, draws};
     #[pymodule_export]
     use crate::error::{ReadError, Unsolvable};
     #[pymodule_export]

@@ -90,12 +90,13 @@ impl Rows {
         sigma: Option<&Bound<'_, PyAny>>,
         block: Option<Vec<usize>>,
     ) -> PyResult<Self> {
-        let (shape, a) = arrays::numbers("a", a)?;
-        let &[n, unknowns @ 1..=MOST] = &shape[..] else {
-            return Err(PyValueError::new_err(format!(
-                "a has shape {shape:?}; give (n, k) with k from 1 to {MOST}"
-            )));
-        };
+        let (n, unknowns, a) = arrays::numbers("a", a, |shape, values| match *shape {
+            [n, unknowns @ 1..=MOST] => Ok((n, unknowns, values.to_vec())),
+            _ => {
+                let words = format!("a has shape {shape:?}; give (n, k) with k from 1 to {MOST}");
+                Err(PyValueError::new_err(words))
+            }
+        })?;
         let b = arrays::vector("b", b)?;
         let sigma = sigma.map_or_else(|| Ok(vec![1.0; n]), |sigma| arrays::vector("sigma", sigma))?;
         let block = block.unwrap_or_else(|| (0..n).collect());

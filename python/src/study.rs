@@ -1,5 +1,7 @@
 //! The paper's studies and ours: parts that can be run anywhere, and what their records show.
 
+use std::sync::Arc;
+
 use egomotion::study::assumptions::Assumptions;
 use egomotion::study::consistency::Consistency;
 use egomotion::study::efficiency::Efficiency;
@@ -14,6 +16,7 @@ use serde::de::DeserializeOwned;
 
 use crate::config::from_keywords;
 use crate::error;
+use crate::signals::interruptible;
 
 /// A study of any kind; records are JSON texts.
 trait AnyStudy: Send + Sync {
@@ -50,8 +53,18 @@ fn words<T>(result: Result<T, impl std::fmt::Display>) -> Result<T, String> {
 fn made<S: Parts + Send + Default + DeserializeOwned + 'static>(
     py: Python<'_>,
     settings: Option<&Bound<'_, PyDict>>,
-) -> PyResult<Box<dyn AnyStudy>> {
-    Ok(Box::new(from_keywords::<S>(py, settings)?))
+) -> PyResult<Arc<dyn AnyStudy>> {
+    Ok(Arc::new(checked::<S>(py, settings)?))
+}
+
+/// A study by keywords that can be run.
+pub fn checked<S: Parts + Default + DeserializeOwned>(
+    py: Python<'_>,
+    settings: Option<&Bound<'_, PyDict>>,
+) -> PyResult<S> {
+    let study: S = from_keywords(py, settings)?;
+    study.check().map_err(error::value)?;
+    Ok(study)
 }
 
 /// A study: independent parts, each of which gives records, and what the records of all of them show.
@@ -59,7 +72,7 @@ fn made<S: Parts + Send + Default + DeserializeOwned + 'static>(
 /// Parts may run in any order and on any machine: the numbers are the same.
 #[pyclass(module = "egomotion", frozen)]
 pub struct Study {
-    study: Box<dyn AnyStudy>,
+    study: Arc<dyn AnyStudy>,
     name: String,
 }
 
@@ -113,13 +126,14 @@ impl Study {
         self.study.parts()
     }
 
-    /// The records of one part, each a JSON text.
+    /// The records of one part, each a JSON text. Ctrl-C ends the wait at once; what was begun runs out unheard.
     fn run(&self, py: Python<'_>, part: usize) -> PyResult<Vec<String>> {
         let parts = self.study.parts().len();
         if part >= parts {
             return Err(PyIndexError::new_err(format!("part {part} of {parts}")));
         }
-        py.detach(|| self.study.run(part)).map_err(error::value)
+        let study = self.study.clone();
+        interruptible(py, move || study.run(part))?.map_err(error::value)
     }
 
     /// Tables of the records, in the order of the parts: name → {column → list}; None where a cell is empty.
@@ -132,12 +146,11 @@ impl Study {
         Ok(tables)
     }
 
-    /// Run all parts in this process, and publish. Ctrl-C stops it between two parts.
+    /// Run all parts in this process, and publish.
     fn tables<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let mut records = Vec::new();
         for part in 0..self.study.parts().len() {
             records.extend(self.run(py, part)?);
-            py.check_signals()?;
         }
         self.publish(py, records)
     }

@@ -130,3 +130,38 @@ fn every_part_has_a_name_of_its_own_and_every_setting_a_part() {
     let unique: std::collections::BTreeSet<_> = parts.iter().collect();
     assert_eq!(unique.len(), parts.len());
 }
+
+#[test]
+fn noise_above_the_signal_leaves_fewer_answers_and_no_crash() {
+    for (noise_px, features) in [(1.0, 8), (20.0, 9), (1000.0, 64)] {
+        let measuring = Measuring {
+            std_disp_px: noise_px,
+            std_vel_px: noise_px,
+            std_track_px: noise_px,
+            features,
+            ..Measuring::real()
+        };
+        measuring.check().unwrap();
+        let found = scores("A", 1.0, measuring, 5);
+        // The paper's VZ of a pixel needs no φ, and so it is there whatever the noise.
+        assert!(figures(&found, ("discrete", "dv", "ls"), "vz").is_some(), "{noise_px} px");
+        let bad = |s: &&Score| s.tally.figures().is_some_and(|f| f.eam.is_nan());
+        assert_eq!(found.iter().find(bad), None, "{noise_px} px");
+    }
+}
+
+#[test]
+fn settings_without_a_meaning_are_named() {
+    let refused = |study: OneSetting| study.check().unwrap_err().to_string();
+    let own = OneSetting::default();
+    assert_eq!(own.check(), Ok(()));
+    let unknown = refused(OneSetting { sequence: "Z".to_owned(), ..own.clone() });
+    assert!(unknown.starts_with("sequence is Z; give one of A, B, C, "), "{unknown}");
+    assert_eq!(refused(OneSetting { step: -1.0, ..own.clone() }), "step is -1.0; give 0.000001 to 1000");
+    assert_eq!(refused(OneSetting { draws: 0, ..own.clone() }), "draws is 0; give 1 to 100000000");
+    let with = |measuring| refused(OneSetting { measuring, ..own.clone() });
+    let real = Measuring::real();
+    assert_eq!(with(Measuring { features: 3, ..real }), "features is 3; give 8 to 100000000");
+    assert_eq!(with(Measuring { round: Some(0), ..real }), "round is 0; give 1 to 4096");
+    assert_eq!(with(Measuring { std_vel_px: f64::NAN, ..real }), "std_vel_px is NaN; give 0 to 1000");
+}

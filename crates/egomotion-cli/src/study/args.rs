@@ -6,6 +6,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use egomotion::pipeline::Method;
 use egomotion::sim::Sequence;
+use egomotion::study::draw::LEAST_FEATURES;
 
 use crate::args::{MethodArg, positive, size};
 
@@ -206,9 +207,6 @@ pub enum PairSensor {
 /// Levels of disparity in a pixel; `None` where disparity is not rounded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Levels(pub Option<u32>);
-
-/// Fewer points do not determine any motion that a noise of one eighth of a pixel leaves standing.
-const LEAST_FEATURES: usize = 8;
 
 fn sequence(text: &str) -> Result<String, String> {
     let known = SEQUENCES.into_iter().find(|name| name.eq_ignore_ascii_case(text));

@@ -66,6 +66,7 @@ impl Laboratory {
             self.interrupted = true;
             return Ok(());
         }
+        study.check().with_context(|| format!("study {}", study.name()))?;
         let parts = study.parts();
         let found = self.run_parts(study, &parts)?;
         self.interrupted = found.failure.is_none() && found.done < parts.len();

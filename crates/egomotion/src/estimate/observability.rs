@@ -70,7 +70,7 @@ impl Observability {
     /// although it has a little of itself there.
     ///
     /// # Errors
-    /// As [`Observability::of`].
+    /// As [`Observability::of`]; [`Unsolvable::Unobservable`] too when no direction exceeds what is uncertain.
     pub fn beyond_noise<const N: usize>(
         information: &SMatrix<f64, N, N>,
         noise: &SMatrix<f64, N, N>,
@@ -91,6 +91,9 @@ impl Observability {
             floors,
             null_share: NULL_SHARE,
         };
+        if found.rank() == 0 {
+            return Err(Unsolvable::Unobservable);
+        }
         // An eigenvector leans towards another by the matrix's error over the difference of their eigenvalues.
         let weakest = found.determined().map(|k| found.eigenvalues[k]).fold(f64::INFINITY, f64::min);
         let lean = found.floors.max() / weakest;

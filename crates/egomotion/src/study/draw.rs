@@ -1,11 +1,14 @@
 //! Measurements of the synthetic world: exact values, plus noise, then rounded.
 
+use std::ops::RangeInclusive;
+
 use rand::seq::index::sample;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 use serde::{Deserialize, Serialize};
 
+use super::range::{COUNTS, OutOfRange, within};
 use super::world::{UsablePixel, When, World};
 use crate::geometry::Gaussian;
 use crate::geometry::gaussian::rounding_variance;
@@ -13,6 +16,14 @@ use crate::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 
 /// Standard deviation that an exact measurement is given, in pixels: weights must stay finite.
 const LEAST_SIGMA_PX: f64 = 1e-4;
+
+/// Fewer points do not determine any motion that a noise of one eighth of a pixel leaves standing.
+pub const LEAST_FEATURES: usize = 8;
+const FEATURES: RangeInclusive<usize> = LEAST_FEATURES..=*COUNTS.end();
+/// Levels of disparity for each pixel.
+const LEVELS: RangeInclusive<u32> = 1..=4096;
+/// More noise than an image is wide says nothing.
+const NOISE_PX: RangeInclusive<f64> = 0.0..=1000.0;
 
 /// What the measurements suffer from: the parameters of the six sweeps but STEP.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -45,6 +56,18 @@ impl Measuring {
     /// The baseline `real`: 1/16 px of disparity, 1/8 px of noise in everything.
     pub fn real() -> Self {
         Self { round: Some(16), std_disp_px: 0.125, std_vel_px: 0.125, std_track_px: 0.125, features: 2048 }
+    }
+
+    /// Nothing if this can be measured.
+    ///
+    /// # Errors
+    /// [`OutOfRange`]: negative noise, no levels, or too few features for any motion.
+    pub fn check(&self) -> Result<(), OutOfRange> {
+        within("round", self.round.unwrap_or(1), &LEVELS)?;
+        within("std_disp_px", self.std_disp_px, &NOISE_PX)?;
+        within("std_vel_px", self.std_vel_px, &NOISE_PX)?;
+        within("std_track_px", self.std_track_px, &NOISE_PX)?;
+        within("features", self.features, &FEATURES)
     }
 
     /// Variance of a measured disparity: its noise and its rounding, (52).

@@ -9,6 +9,7 @@ pub mod contender;
 pub mod draw;
 pub mod efficiency;
 pub mod figure;
+pub mod range;
 pub mod real;
 pub mod sensitivity;
 pub mod table;
@@ -20,6 +21,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 pub use figure::{Axis, Content, Figure, Line, Panel, Point, Series};
+pub use range::OutOfRange;
 pub use table::{Cell, Column, Table};
 
 /// An experiment made of independent parts. Its own fields are its settings: they decide every number.
@@ -34,6 +36,14 @@ pub trait Study: Serialize + Sync {
 
     /// Name, as in `egomotion study NAME`.
     fn name(&self) -> &'static str;
+
+    /// Nothing if it can be run with these settings.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the first setting that has no meaning.
+    fn check(&self) -> Result<(), OutOfRange> {
+        Ok(())
+    }
 
     /// Names of the parts, each its own, in the order they run.
     fn parts(&self) -> Vec<String>;

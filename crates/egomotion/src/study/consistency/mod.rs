@@ -20,6 +20,7 @@ use super::{Cell, Publication, Study, Table};
 use crate::pipeline::Observe;
 use crate::pipeline::stereo::PipelineError;
 use crate::sim::Sequence;
+use crate::study::range::{COUNTS, OutOfRange, sequences, size, within};
 pub use depth::DepthKind;
 use pair::Pair;
 
@@ -128,6 +129,12 @@ impl Study for Consistency {
 
     fn name(&self) -> &'static str {
         "consistency"
+    }
+
+    fn check(&self) -> Result<(), OutOfRange> {
+        sequences(&self.sequences)?;
+        size(self.width_px, self.height_px)?;
+        within("pairs", self.pairs, &COUNTS)
     }
 
     fn parts(&self) -> Vec<String> {

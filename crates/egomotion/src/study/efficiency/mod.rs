@@ -17,6 +17,7 @@ use super::contender::{Contender, approach_name};
 use super::{Cell, Publication, Study, Table};
 use crate::pipeline::{Approach, Method};
 use crate::sim::Sequence;
+use crate::study::range::{COUNTS, OutOfRange, sequences, within};
 use degenerate::{Report, SCENES};
 use setting::{Ends, Kind, Place, Score, Setting};
 
@@ -167,6 +168,11 @@ impl Study for Efficiency {
 
     fn name(&self) -> &'static str {
         "efficiency"
+    }
+
+    fn check(&self) -> Result<(), OutOfRange> {
+        sequences(&self.sequences)?;
+        within("draws", self.draws, &COUNTS)
     }
 
     fn parts(&self) -> Vec<String> {

@@ -12,6 +12,7 @@ use super::{depth_velocity, estimates, publish};
 use crate::estimate::MotionEstimate;
 use crate::pipeline::stereo::PipelineError;
 use crate::sim::{Sequence, StereoImages};
+use crate::study::range::{OutOfRange, sequences, size, within};
 use crate::study::{Publication, Study};
 
 /// Tables 3 to 7 and Figures 11 to 14 on rendered images of lab-A … lab-M.
@@ -155,6 +156,16 @@ impl Study for LabStudy {
 
     fn name(&self) -> &'static str {
         "real"
+    }
+
+    fn check(&self) -> Result<(), OutOfRange> {
+        sequences(&self.sequences)?;
+        size(self.width_px, self.height_px)?;
+        within("step", self.step, &(1..=64))?;
+        within("poses", self.poses, &(0..=1000))?;
+        within("seeds", self.seeds, &(1..=1_000_000))?;
+        within("levels", self.levels, &(1..=4096))?;
+        within("sample_step_px", self.sample_step_px, &(1..=64))
     }
 
     fn parts(&self) -> Vec<String> {

@@ -3,6 +3,8 @@
 mod figures;
 pub mod setting;
 
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -10,8 +12,11 @@ use super::draw::Measuring;
 use super::{Cell, Publication, Study, Table};
 use crate::pipeline::Approach;
 use crate::sim::Sequence;
+use crate::study::range::{COUNTS, OutOfRange, sequences, within};
 use setting::{Score, Setting, merged};
 
+/// STEP of a single setting.
+const STEPS: RangeInclusive<f64> = 1e-6..=1000.0;
 /// Draws that one part of a single setting takes.
 const DRAWS_PER_PART: usize = 10;
 /// Columns of the study's file.
@@ -229,6 +234,11 @@ impl Study for Sensitivity {
         "sensitivity"
     }
 
+    fn check(&self) -> Result<(), OutOfRange> {
+        sequences(&self.sequences)?;
+        within("draws", self.draws, &COUNTS)
+    }
+
     fn parts(&self) -> Vec<String> {
         let name = |(sequence, baseline, sweep, value): (&str, Baseline, Sweep, f64)| {
             format!("{sequence} {} {} {}", baseline.name(), sweep.name(), value_name(value))
@@ -296,6 +306,23 @@ impl Default for OneSetting {
 }
 
 impl OneSetting {
+    /// The sequence, as long as one motion takes.
+    ///
+    /// # Errors
+    /// [`SensitivityError`]: there is none of that name, or its cameras leave the room.
+    pub fn sequence(&self) -> Result<Sequence, SensitivityError> {
+        let sequence = sequence(&self.sequence)?;
+        if self.of(&sequence).clearance_m().partial_cmp(&0.0) == Some(std::cmp::Ordering::Greater) {
+            return Ok(sequence);
+        }
+        Err(SensitivityError::OutOfRoom { sequence: self.sequence.clone(), step: self.step })
+    }
+
+    /// The setting of that sequence.
+    pub fn of<'a>(&self, sequence: &'a Sequence) -> Setting<'a> {
+        Setting { sequence, step: self.step, measuring: self.measuring, seed: self.seed }
+    }
+
     fn baseline(&self) -> &'static str {
         let is = |baseline: Baseline| self.step == 1.0 && self.measuring == baseline.measuring();
         [Baseline::Clean, Baseline::Real].into_iter().find(|b| is(*b)).map_or("custom", Baseline::name)
@@ -310,6 +337,13 @@ impl Study for OneSetting {
         "table"
     }
 
+    fn check(&self) -> Result<(), OutOfRange> {
+        sequences([&self.sequence])?;
+        self.measuring.check()?;
+        within("draws", self.draws, &COUNTS)?;
+        within("step", self.step, &STEPS)
+    }
+
     fn parts(&self) -> Vec<String> {
         let last = |first: usize| (first + DRAWS_PER_PART).min(self.draws);
         let name = |first: usize| format!("draws {} to {}", first + 1, last(first));
@@ -317,9 +351,7 @@ impl Study for OneSetting {
     }
 
     fn run(&self, part: usize) -> Result<Vec<Record>, SensitivityError> {
-        let sequence = sequence(&self.sequence)?;
-        let setting =
-            Setting { sequence: &sequence, step: self.step, measuring: self.measuring, seed: self.seed };
+        let sequence = self.sequence()?;
         let first = part * DRAWS_PER_PART;
         let range = first..(first + DRAWS_PER_PART).min(self.draws);
         let record = |score| Record {
@@ -330,11 +362,7 @@ impl Study for OneSetting {
             score,
         };
         let approaches = [Approach::Differential, Approach::Discrete];
-        if setting.clearance_m().partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
-            let (sequence, step) = (self.sequence.clone(), self.step);
-            return Err(SensitivityError::OutOfRoom { sequence, step });
-        }
-        Ok(setting.scores(range, &approaches).into_iter().map(record).collect())
+        Ok(self.of(&sequence).scores(range, &approaches).into_iter().map(record).collect())
     }
 
     fn publish(&self, records: &[Record]) -> Publication {

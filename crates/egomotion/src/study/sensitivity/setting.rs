@@ -17,7 +17,7 @@ use crate::study::tally::Tally;
 use crate::study::world::{UsablePixel, World};
 
 /// Reference poses exp(k φ) that the draws go through in turn.
-const POSES: [i32; 5] = [-2, -1, 0, 1, 2];
+pub const POSES: [i32; 5] = [-2, -1, 0, 1, 2];
 /// Quantities of φ, and the factors to millimetres and degrees.
 const COMPONENTS: [(&str, f64); 6] = [
     ("tx", 1e3),
@@ -71,15 +71,25 @@ impl Setting<'_> {
         POSES.into_iter().flat_map(at).map(clearance).fold(f64::INFINITY, f64::min)
     }
 
+    /// The world that draw `i` is taken in, at the pose i mod 5; `None` for a sequence without motion.
+    pub fn world(&self, i: usize) -> Option<World> {
+        let phi = self.sequence.phi_cyclopean(0)?;
+        Some(World::new(&self.sequence.scene, &self.sequence.rig, &phi, POSES[i % POSES.len()], self.step))
+    }
+
+    /// Seed of draw `i`.
+    pub fn seed_of(&self, i: usize) -> u64 {
+        self.seed.wrapping_mul(1_000_003).wrapping_add(i as u64)
+    }
+
     /// Scores of the draws in `range`, in a fixed order; draw i is taken at the pose i mod 5.
     pub fn scores(&self, range: std::ops::Range<usize>, approaches: &[Approach]) -> Vec<Score> {
         let Some(phi) = self.sequence.phi_cyclopean(0) else { return Vec::new() };
         let needed = |pose: usize| range.clone().any(|i| i % POSES.len() == pose);
-        let (scene, rig) = (&self.sequence.scene, &self.sequence.rig);
-        let centre = -rig.left_from_cyclopean();
+        let centre = -self.sequence.rig.left_from_cyclopean();
         let worlds: Vec<Option<(World, Floors)>> = (0..POSES.len())
             .map(|pose| {
-                let world = needed(pose).then(|| World::new(scene, rig, &phi, POSES[pose], self.step))?;
+                let world = if needed(pose) { self.world(pose)? } else { return None };
                 let floors = Floors::of(&world);
                 Some((world, floors))
             })
@@ -88,7 +98,7 @@ impl Setting<'_> {
             .into_par_iter()
             .map(|i| {
                 let Some((world, floors)) = &worlds[i % POSES.len()] else { return Vec::new() };
-                let seed = self.seed.wrapping_mul(1_000_003).wrapping_add(i as u64);
+                let seed = self.seed_of(i);
                 let trial = |approach: &Approach| match approach {
                     Approach::Differential => {
                         Trial::differential(world, floors.differential_m, &self.measuring, seed)

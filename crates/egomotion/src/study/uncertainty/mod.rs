@@ -20,6 +20,7 @@ use thiserror::Error;
 
 use super::{Publication, Study};
 use crate::sim::Sequence;
+use crate::study::range::{COUNTS, OutOfRange, size, within};
 use coefficients::Coefficients;
 use comparison::Comparison;
 use formula::Family;
@@ -118,6 +119,12 @@ impl Study for Uncertainty {
 
     fn name(&self) -> &'static str {
         "uncertainty"
+    }
+
+    fn check(&self) -> Result<(), OutOfRange> {
+        size(self.size_px.0, self.size_px.1)?;
+        within("draws", self.draws, &(2..=*COUNTS.end()))?;
+        within("settings", self.settings, &COUNTS)
     }
 
     fn parts(&self) -> Vec<String> {
