@@ -1,11 +1,13 @@
 """Answers in the viewer Rerun (`pip install "egomotion[rerun]"`): the camera on its way, maps, time series.
 
-    import rerun, egomotion, egomotion.rerun
+```python
+import rerun, egomotion, egomotion.rerun
 
-    rerun.init("egomotion", spawn=True)
-    run = egomotion.run("recordings/06")
-    for m in run:
-        egomotion.rerun.log(m, rig=run.rig)
+rerun.init("egomotion", spawn=True)
+run = egomotion.run("recordings/06")
+for m in run:
+    egomotion.rerun.log(m, rig=run.rig)
+```
 """
 
 from __future__ import annotations
