@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// What the tests need besides the wheel's own dependencies.
-const NEEDED: [&str; 10] = [
+const NEEDED: [&str; 15] = [
     "maturin>=1.9,<2",
     "numpy",
     "pytest>=8",
@@ -15,6 +15,11 @@ const NEEDED: [&str; 10] = [
     "evo>=1.30",
     "ray[default]>=2.40",
     "fsspec",
+    "matplotlib>=3.6",
+    "nbclient>=0.7",
+    "nbformat>=5.2",
+    "ipykernel>=6",
+    "rerun-sdk>=0.24",
 ];
 
 #[test]
