@@ -95,7 +95,7 @@ def join(chunks: Sequence[Chunk], unreadable: Mapping[Chunk, str], results: Resu
 
 
 def _table(part: bytes) -> pa.Table:
-    return pq.read_table(pa.BufferReader(part))
+    return pq.ParquetFile(pa.BufferReader(part)).read()
 
 
 def _unread(chunk: Chunk, reason: str) -> pa.Table:
