@@ -81,7 +81,7 @@ class Bench:
 
 
 def start(workers):
-    ray.init(num_cpus=workers, log_to_driver=False, logging_level=logging.ERROR)
+    ray.init("local", num_cpus=workers, log_to_driver=False, logging_level=logging.ERROR)
 
 
 def bytes_a_frame(recording):

@@ -28,6 +28,7 @@ pq = pytest.importorskip("pyarrow.parquet")
 fsspec = pytest.importorskip("fsspec")
 
 import egomotion.ray  # noqa: E402
+from egomotion.ray import tasks  # noqa: E402
 from egomotion.ray.results import Results  # noqa: E402
 
 #: Two parts.
@@ -152,6 +153,16 @@ def test_a_study_gives_the_numbers_of_one_process_though_a_worker_dies(cluster: 
     assert sorted(times(tmp_path)) == ["000000", "000001"]
 
 
+def test_a_task_that_kills_every_worker_does_not_end_all(cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tasks, "RETRIES", 1)
+
+    def work(code: int) -> int:
+        return os._exit(1) if code else code
+
+    found = tasks.gather(work, [(1,), (0,)], "calls", died=lambda error: type(error).__name__)
+    assert found == ["WorkerCrashedError", 0]
+
+
 class Server(http.server.ThreadingHTTPServer):
     """Takes as many connections at once as a store."""
 
@@ -236,6 +247,8 @@ def test_the_command_runs_recordings(cluster: Cluster, recordings: Path, tmp_pat
     other = ran("--address", cluster.address, "run", recordings, "--out", tmp_path)
     assert other.returncode == 1
     assert other.stderr.splitlines()[-1].startswith(f"error: {tmp_path}: holds results of other settings")
+    wrong = ran("--address", cluster.address, "study", "table", "--settings", '{"sequence": "Q"}', "--out", tmp_path / "Q")
+    assert wrong.returncode == 1 and "Traceback" not in wrong.stderr and wrong.stderr.splitlines()[-1].startswith("error: ")
     # None can be read.
     none = ran("--address", cluster.address, "run", recordings / "empty", "--out", tmp_path / "none")
     assert none.returncode == 1 and "Traceback" not in none.stderr

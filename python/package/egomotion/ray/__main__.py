@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import ray
+from ray.exceptions import RayError, RayTaskError
 
 import egomotion
-from egomotion.ray import Summary, run, study
+from egomotion.ray import OVERLAP, Summary, run, study
 from egomotion.ray.motion import check
 
 
@@ -38,7 +39,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted; the same command goes on with what is left", file=sys.stderr)
         return 130
-    except (ConnectionError, OSError, RuntimeError, ValueError) as error:
+    except RayTaskError as error:
+        print(f"error: {error.cause}", file=sys.stderr)
+        return 1
+    except (RayError, OSError, RuntimeError, ValueError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 1
 
@@ -57,13 +61,13 @@ def _parser() -> argparse.ArgumentParser:
         epilog="What is finished is not done again: give the same command after a stop. Exit code 0: done, though some "
         "recordings may be unreadable; 1: failed, or none could be read; 2: wrong usage; 130: interrupted.",
     )
-    parser.add_argument("--address", help="of the cluster; by default RAY_ADDRESS, or this machine alone")
+    parser.add_argument("--address", help="of the cluster; by default RAY_ADDRESS, one that runs on this machine, or one started for this alone")
     commands = parser.add_subparsers(dest="work", required=True)
     one = commands.add_parser("run", help="run recordings")
     one.add_argument("sources", nargs="+", metavar="SOURCE", help="a recording or a folder of recordings, path or URL")
     one.add_argument("--out", required=True, help="folder of the results, path or URL")
     one.add_argument("--chunk", type=int, metavar="N", help="frames a task, for long recordings")
-    one.add_argument("--overlap", type=int, default=10, metavar="N", help="frames read before each chunk")
+    one.add_argument("--overlap", type=int, default=OVERLAP, metavar="N", help="frames read before each chunk")
     one.add_argument("--options", type=_object, default={}, metavar="JSON", help="keywords of egomotion.run")
     two = commands.add_parser("study", help="run a study")
     two.add_argument("name", choices=egomotion.Study.names())
