@@ -5,6 +5,7 @@ import http.server
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -142,6 +143,14 @@ def test_chunks_are_joined_again(cluster: Cluster, recordings: Path, tmp_path: P
         seen = zip(("tx", "ty", "tz", "wx", "wy", "wz"), b["observed"])
         for i, name in [(i, name) for i, (name, there) in enumerate(seen) if there == "1"]:
             assert abs(a[name] - b[name]) < 3 * b[f"cov_{i}{i}"] ** 0.5
+
+
+def test_recordings_with_one_calibration_for_all(cluster: Cluster, recordings: Path, tmp_path: Path) -> None:
+    options: dict[str, Any] = {"observe": "sparse", "calibration": str(recordings / "A" / "calib.txt")}
+    shutil.copytree(recordings / "A", tmp_path / "in" / "bare", ignore=shutil.ignore_patterns("calib.txt"))
+    for chunk in (None, 5):
+        egomotion.ray.run([tmp_path / "in"], tmp_path / str(chunk), chunk=chunk, progress=False, **options)
+        assert rows_of(tmp_path / str(chunk), tmp_path / "in" / "bare") == alone(recordings / "A", observe="sparse")
 
 
 def test_a_study_gives_the_numbers_of_one_process_though_a_worker_dies(cluster: Cluster, tmp_path: Path) -> None:

@@ -64,14 +64,14 @@ def run(
     motion.check(options, chunk, overlap)
     results = Results(_everywhere(out))
     results.begin({"run": options, "chunk": chunk, "overlap": overlap, "version": egomotion.__version__})
-    given = [(_everywhere(source),) for source in sources]
+    given = [(_everywhere(source), options.get("calibration")) for source in sources]
     found = gather(recordings.find, given, "sources", progress=progress)
     # A folder and a recording in it may both be given.
     paths = list(dict.fromkeys(path for some in found for path in some))
     if chunk is None:
         chunks = [recordings.Chunk(path) for path in paths]
     else:
-        asked = [(path, chunk, overlap, options.get("stride", 1)) for path in paths]
+        asked = [(path, chunk, overlap, options) for path in paths]
         cut = gather(recordings.cut, asked, "lengths", progress=progress)
         chunks = [piece for pieces in cut for piece in pieces]
     done = results.done()

@@ -53,11 +53,12 @@ def leave(chunk: Chunk, results: Results, options: dict[str, Any]) -> str | None
 
 def _rows(chunk: Chunk, options: dict[str, Any]) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
+    calibration = options.get("calibration")
     # A bad image may be one that was not copied, if the cameras' files do not go side by side.
     for span in dict.fromkeys([chunk.span, None]):
         with tempfile.TemporaryDirectory() as folder:
             path = copied(chunk.source, folder, span)
-            names = egomotion.sequences(path) if chunk.sequence is None else [chunk.sequence]
+            names = [chunk.sequence] if chunk.sequence else egomotion.sequences(path, calibration=calibration)
             rows = [row for name in names for row in _sequence(path, name, chunk, options)]
         if all(row["status"] != "bad_image" for row in rows):
             break

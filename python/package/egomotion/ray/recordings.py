@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import fsspec
 from fsspec.implementations.local import LocalFileSystem
@@ -42,7 +43,7 @@ class Chunk:
         return f"{path}-{self.keep:09d}"
 
 
-def find(source: str) -> list[str]:
+def find(source: str, calibration: str | None) -> list[str]:
     """The source itself, or the recordings in it: it is none, but a folder in it is.
 
     Where nothing can be read the source is left to its task, which says why.
@@ -50,30 +51,30 @@ def find(source: str) -> list[str]:
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(outline(source, folder))
-            if _is_recording(path) or not path.is_dir() or "::" in source:
+            if _is_recording(path, calibration) or not path.is_dir() or "::" in source:
                 return [source]
             inside = sorted(entry for entry in path.iterdir() if entry.is_dir() and not entry.name.startswith("."))
-            if not any(_is_recording(entry) for entry in inside):
+            if not any(_is_recording(entry, calibration) for entry in inside):
                 return [source]
             return [f"{source.rstrip('/')}/{entry.name}" for entry in inside]
     except Exception:
         return [source]
 
 
-def _is_recording(path: Path) -> bool:
+def _is_recording(path: Path, calibration: str | None) -> bool:
     try:
-        return bool(egomotion.sequences(path))
+        return bool(egomotion.sequences(path, calibration=calibration))
     except egomotion.ReadError:
         return False
 
 
-def cut(source: str, chunk: int, overlap: int, stride: int) -> list[Chunk]:
+def cut(source: str, chunk: int, overlap: int, options: dict[str, Any]) -> list[Chunk]:
     """The chunks of a recording; one that cannot be read is left to its task, which says why."""
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = outline(source, folder)
-            names = egomotion.sequences(path)
-            lengths = {name: len(egomotion.run(path, sequence=name, stride=stride)) for name in names}
+            names = egomotion.sequences(path, calibration=options.get("calibration"))
+            lengths = {name: len(egomotion.run(path, sequence=name, **options)) for name in names}
             copies = Path(folder) in Path(path).parents
     except Exception:
         return [Chunk(source)]
