@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::depth::Camera;
 use super::{BySigma, Record, Sensor};
-use crate::geometry::{RigidMotion, StereoRig, Twist};
+use crate::geometry::{RigidMotion, Twist};
 use crate::pipeline::stereo::{DenseResults, PipelineError};
 use crate::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion};
 use crate::sim::{Scene, SensorNoise, Sequence, View};
@@ -95,12 +95,14 @@ impl<'a> Pair<'a> {
             record.cov = found.theta.cov.iter().copied().collect();
         }
         if let Some(dense) = &answer.dense {
-            self.judge_pixels(&mut record, dense, &phi, &rig);
+            let interval_s = answer.dt_s.unwrap_or(self.sequence.interval_s);
+            self.judge_pixels(&mut record, dense, &phi, interval_s);
         }
         Ok(record)
     }
 
-    fn judge_pixels(&self, record: &mut Record, dense: &DenseResults, phi: &Twist, rig: &StereoRig) {
+    fn judge_pixels(&self, record: &mut Record, dense: &DenseResults, phi: &Twist, interval_s: f64) {
+        let rig = &self.sequence.rig;
         let truth = self.view(0).truth_maps(Some(phi));
         let maps = &dense.motion;
         let (mut answers, mut pixels) = (0, 0);
@@ -118,7 +120,7 @@ impl<'a> Pair<'a> {
                 answers += 1;
                 record.depth_velocity.add(f64::from(found - vz), sigma.into());
                 if let Some(impact) = maps.impact(u, v) {
-                    let looming = f64::from(-vz / (z + vz)) / self.sequence.interval_s;
+                    let looming = f64::from(-vz / (z + vz)) / interval_s;
                     record.looming.add(impact.looming.value() - looming, impact.looming.sigma(0));
                 }
             }
