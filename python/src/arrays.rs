@@ -88,6 +88,23 @@ pub fn field(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Field> {
     Ok(Field::from_grid(plane))
 }
 
+/// Planes side by side (H, W, N) of float32 or float64 whose missing pixels are NaN.
+pub fn fields<const N: usize>(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<[Field; N]> {
+    let wanted = format!("(height, width, {N}), not empty");
+    let split = |shape: &[usize], level: &dyn Fn(usize) -> f32| match *shape {
+        [height, width, n] if n == N && height > 0 && width > 0 => Ok(std::array::from_fn(|k| {
+            Field::from_grid(Grid::from_fn(width, height, |u, v| level((v * width + u) * N + k)))
+        })),
+        _ => Err(wrong_shape(name, shape, &wanted)),
+    };
+    let array = contiguous(&array(argument)?)?;
+    if let Some(planes) = values(&array, |shape, levels: &[f32]| split(shape, &|i| levels[i]))? {
+        return Ok(planes);
+    }
+    let planes = values(&array, |shape, levels: &[f64]| split(shape, &|i| levels[i] as f32))?;
+    planes.ok_or_else(|| wrong_type(name, &array, "float32 with NaN where it is unknown"))
+}
+
 /// A plane (H, W) of booleans.
 pub fn mask(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Grid<bool>> {
     let array = contiguous(&array(argument)?)?;
@@ -119,6 +136,18 @@ pub fn numbers<R>(
     as_they_are.set_item("copy", false)?;
     let doubles = array.call_method("astype", ("float64",), Some(&as_they_are))?;
     values(&contiguous(&doubles)?, take)?.ok_or_else(wrong)
+}
+
+/// A function of each number, in an array of the same shape.
+pub fn each<'py>(
+    name: &str,
+    argument: &Bound<'py, PyAny>,
+    of: impl Fn(f64) -> f64,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let py = argument.py();
+    numbers(name, argument, |shape, values| {
+        PyArray1::from_iter(py, values.iter().map(|&value| of(value))).reshape(shape)
+    })
 }
 
 /// n numbers: (n,).

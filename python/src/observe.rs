@@ -2,7 +2,7 @@
 
 use egomotion::geometry::Twist;
 use egomotion::observe::tracks::{Hints, stereo_tracks};
-use egomotion::observe::{DisparityMap, DisparityMatcher, Pyramid, StereoPyramid, dense_flow};
+use egomotion::observe::{DisparityMap, DisparityMatcher, FlowField, Pyramid, StereoPyramid, dense_flow};
 use egomotion::pipeline::Config;
 use egomotion_io::given;
 use numpy::PyArray3;
@@ -34,6 +34,28 @@ pub fn given_map(
         return Err(error::value("disparity and disparity_sigma differ in size"));
     }
     Ok(Some(DisparityMap { shift, sigma }))
+}
+
+/// Flow that the caller has.
+pub fn given_flow(
+    flow: Option<&Bound<'_, PyAny>>,
+    covariance: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Option<FlowField>> {
+    let Some(flow) = flow else {
+        return match covariance {
+            None => Ok(None),
+            Some(_) => Err(error::value("flow_covariance needs flow")),
+        };
+    };
+    let [u, v] = arrays::fields("flow", flow)?;
+    let found = FlowField::given(u, v, given::SIGMA_PX);
+    let Some(covariance) = covariance else { return Ok(Some(found)) };
+    let planes = arrays::fields::<3>("flow_covariance", covariance)?;
+    if planes[0].size() != found.size() {
+        return Err(error::value("flow and flow_covariance differ in size"));
+    }
+    let [cov_uu, cov_uv, cov_vv] = planes.map(|plane| plane.grid().clone());
+    Ok(Some(FlowField { cov_uu, cov_uv, cov_vv, ..found }))
 }
 
 /// The settings of one part, by keywords.

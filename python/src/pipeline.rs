@@ -1,9 +1,7 @@
 //! Frames in, motion out.
 
 use egomotion::pipeline::rgbd::VIRTUAL_BASELINE_M;
-use egomotion::pipeline::{
-    DepthCamera, DepthNoise, Frame, RgbdMotion as Rgbd, StereoFrame, StereoMotion as Stereo,
-};
+use egomotion::pipeline::{DepthCamera, DepthNoise, Frame, RgbdMotion as Rgbd, StereoMotion as Stereo};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -12,7 +10,7 @@ use crate::arrays;
 use crate::config::{Threads, config};
 use crate::error;
 use crate::frame_motion::FrameMotion;
-use crate::observe::given_map;
+use crate::observe::{given_flow, given_map};
 use crate::rig::Rig;
 
 /// Turns a sequence of rectified stereo images into motion.
@@ -54,8 +52,12 @@ impl StereoMotion {
     /// Images are (H, W), or (H, W, 3) as red, green, blue; uint8, uint16 (0 … 65535) or float32
     /// (0 … 255). With `disparity` (H, W), and perhaps
     /// its `disparity_sigma`, of the left image's pixels that map is used in place of our own, and the right image may
-    /// be None. An image that cannot be used is no exception: the answer's status says why.
-    #[pyo3(signature = (left, right, time, *, disparity = None, disparity_sigma = None))]
+    /// be None. With `flow` (H, W, 2), and perhaps its `flow_covariance` (H, W, 3) as uu, uv, vv, from the left image of the
+    /// frame before to this one, on the earlier one's pixels, that is used too. An image that cannot be used is no exception: the answer's status says why.
+    #[pyo3(signature = (
+        left, right, time, *, disparity = None, disparity_sigma = None, flow = None, flow_covariance = None
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn push(
         &mut self,
         py: Python<'_>,
@@ -64,15 +66,19 @@ impl StereoMotion {
         time: f64,
         disparity: Option<&Bound<'_, PyAny>>,
         disparity_sigma: Option<&Bound<'_, PyAny>>,
+        flow: Option<&Bound<'_, PyAny>>,
+        flow_covariance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<FrameMotion> {
         let left = arrays::image("left", left)?;
         let right = right.map(|right| arrays::image("right", right)).transpose()?;
         let disparity = given_map(disparity, disparity_sigma)?;
-        let frame = match (right, disparity) {
-            (Some(right), None) => StereoFrame { time_s: time, left, right }.into(),
-            (None, None) => return Err(PyValueError::new_err("give the right image, or a disparity map")),
-            (right, disparity) => Frame { time_s: time, left, right, disparity, flow: None },
-        };
+        if let Some(flow) = given_flow(flow, flow_covariance)? {
+            self.motion.set_flow(flow).map_err(error::value)?;
+        }
+        if right.is_none() && disparity.is_none() {
+            return Err(PyValueError::new_err("give the right image, or a disparity map"));
+        }
+        let frame = Frame { time_s: time, left, right, disparity, flow: None };
         let motion = &mut self.motion;
         Ok(FrameMotion::of(self.threads.run(py, || motion.push(frame))))
     }

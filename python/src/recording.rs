@@ -29,7 +29,7 @@ pub fn sequences(py: Python<'_>, path: PathBuf, calibration: Option<PathBuf>) ->
 ///
 /// `path` is what `egomotion run` takes; of a set of scenes `sequence` names one of `sequences(path)`. `sensor` is "stereo"
 /// or "depth"; `disparity` and `flow` are folders of maps, `tracks` a file, `mask` an image. Other keywords are the settings
-/// of `default_config()`.
+/// of `default_config()`, and so are these three where they are dictionaries.
 #[pyfunction]
 #[pyo3(signature = (
     path, *, sequence = None, calibration = None, start = 0, frames = None, stride = 1, reverse = false, sensor = None,
@@ -46,9 +46,9 @@ pub fn run(
     stride: usize,
     reverse: bool,
     sensor: Option<&str>,
-    disparity: Option<PathBuf>,
-    flow: Option<PathBuf>,
-    tracks: Option<PathBuf>,
+    disparity: Option<&Bound<'_, PyAny>>,
+    flow: Option<&Bound<'_, PyAny>>,
+    tracks: Option<&Bound<'_, PyAny>>,
     mask: Option<PathBuf>,
     threads: Option<usize>,
     settings: Option<&Bound<'_, PyDict>>,
@@ -66,9 +66,13 @@ pub fn run(
     if stride == 0 {
         return Err(PyValueError::new_err("stride is 0; give at least 1"));
     }
+    let settings = settings.map_or_else(|| Ok(PyDict::new(py)), |given| given.copy())?;
+    let [disparity, flow, tracks] = [("disparity", disparity), ("flow", flow), ("tracks", tracks)]
+        .map(|(name, given)| file_or_settings(name, given, &settings));
+    let (disparity, flow, tracks) = (disparity?, flow?, tracks?);
     let choice =
         Choice { start, frames, stride: Some(stride), reverse, sensor, disparity, flow, tracks, mask };
-    let (config, threads) = (config(py, settings)?, Threads::new(threads)?);
+    let (config, threads) = (config(py, Some(&settings))?, Threads::new(threads)?);
     let (name, recording) = py.detach(|| -> PyResult<_> {
         let source = Source::open_with(&path, calibration.as_deref()).map_err(error::read)?;
         let found = named(source, sequence)?;
@@ -84,6 +88,18 @@ pub fn run(
         trajectory: Trajectory::new(),
         threads,
     })
+}
+
+/// A path; a dictionary goes to the settings of that name.
+fn file_or_settings(
+    name: &str,
+    given: Option<&Bound<'_, PyAny>>,
+    settings: &Bound<'_, PyDict>,
+) -> PyResult<Option<PathBuf>> {
+    match given {
+        Some(part) if part.is_instance_of::<PyDict>() => settings.set_item(name, part).map(|()| None),
+        given => given.map(|path| path.extract()).transpose(),
+    }
 }
 
 /// The sequence of that name, or the only one.

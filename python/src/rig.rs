@@ -1,7 +1,7 @@
 //! A rectified pair of cameras.
 
 use egomotion::geometry::StereoRig;
-use numpy::{PyArray1, PyArray2};
+use numpy::{PyArray2, PyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -80,16 +80,14 @@ impl Rig {
         (self.0.width_px, self.0.height_px)
     }
 
-    /// Depth Z (n,) in metres of disparities d (n,) in pixels; NaN where d is not positive.
-    fn depth<'py>(&self, py: Python<'py>, d: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let d = arrays::vector("d", d)?;
-        Ok(PyArray1::from_iter(py, d.into_iter().map(|d| self.0.depth(d).unwrap_or(f64::NAN))))
+    /// Depth Z in metres of disparities d in pixels, both of any one shape; NaN where d is not positive.
+    fn depth<'py>(&self, d: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        arrays::each("d", d, |d| self.0.depth(d).unwrap_or(f64::NAN))
     }
 
-    /// Disparity d (n,) in pixels of depths (n,) in metres; NaN where Z is not positive.
-    fn disparity<'py>(&self, py: Python<'py>, z: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let z = arrays::vector("z", z)?;
-        Ok(PyArray1::from_iter(py, z.into_iter().map(|z| self.0.disparity(z).unwrap_or(f64::NAN))))
+    /// Disparity d in pixels of depths in metres, both of any one shape; NaN where Z is not positive.
+    fn disparity<'py>(&self, z: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        arrays::each("z", z, |z| self.0.disparity(z).unwrap_or(f64::NAN))
     }
 
     /// Points P (n, 3) in metres, left camera, of (x, y, d) (n, 3) in pixels; NaN where d is not positive.

@@ -87,6 +87,52 @@ def test_own_disparity_takes_the_place_of_ours() -> None:
     assert np.abs(answer.phi - C.phi(0)).max() < 1e-3
 
 
+def test_own_flow_takes_the_place_of_ours() -> None:
+    flow, covariance = em.flow(FRAMES[0][0], FRAMES[1][0])
+    own = em.StereoMotion(C.rig)
+    own.push(*FRAMES[0], 0.0)
+    answer = own.push(*FRAMES[1], 0.1, flow=flow, flow_covariance=covariance)
+    assert answer.status == "ok" and answer.flow is not None
+    known = np.isfinite(flow[..., 0])
+    assert np.array_equal(answer.flow[known], flow[known])
+    assert inside(answer, C.phi(0))
+    # Without a covariance each pixel has the same, and where one component is unknown both are.
+    holes = flow.astype(np.float64)
+    holes[:20, :, 1] = np.nan
+    other = em.StereoMotion(C.rig)
+    other.push(*FRAMES[0], 0.0)
+    answer = other.push(*FRAMES[1], 0.1, flow=holes)
+    assert np.abs(answer.phi - C.phi(0)).max() < 1e-3
+    wrongs: list[tuple[dict[str, Any], str]] = [
+        ({"flow": flow[..., 0]}, "give \\(height, width, 2\\)"),
+        ({"flow": np.zeros(flow.shape, np.int32)}, "flow has dtype int32"),
+        ({"flow_covariance": covariance}, "flow_covariance needs flow"),
+        ({"flow": flow, "flow_covariance": covariance[1:]}, "differ in size"),
+        ({"flow": flow[1:]}, "the flow is 320x239, the rig 320x240"),
+    ]
+    for wrong, words in wrongs:
+        with pytest.raises((TypeError, ValueError), match=words):
+            own.push(*FRAMES[2], 0.2, **wrong)
+    # Nothing of these calls has passed for a frame.
+    assert own.push(*FRAMES[2], 0.2).frame == 2
+
+
+def test_the_nearest_obstacle_has_a_time_and_a_place() -> None:
+    drive = em.Sequence("drive", frames=2)
+    motion = em.StereoMotion(drive.rig)
+    for k in range(2):
+        answer = motion.push(*drive.render(k, samples=2), k * drive.interval)
+    assert answer.impact is not None and answer.no_obstacle is None and answer.impact_map is not None
+    impact = answer.impact
+    assert impact.seconds is not None and impact.interval95 is not None and impact.bounds is not None
+    low, high = impact.interval95
+    assert 0 < low < impact.seconds < high
+    assert impact.looming == pytest.approx(1 / impact.seconds) and impact.looming_sigma > 0
+    u, v, width, height = impact.bounds
+    region = answer.impact_map[v : v + height, u : u + width]
+    assert np.nanmin(region) < high and impact.points is not None and impact.points <= width * height
+
+
 def test_depth_camera() -> None:
     rig = C.rig
     motion = em.RgbdMotion(rig.focal, rig.centre, rig.size, noise="exact", observe="sparse")

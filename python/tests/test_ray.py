@@ -257,7 +257,8 @@ def test_the_command_runs_recordings(cluster: Cluster, recordings: Path, tmp_pat
     assert other.returncode == 1
     assert other.stderr.splitlines()[-1].startswith(f"error: {tmp_path}: holds results of other settings")
     wrong = ran("--address", cluster.address, "study", "table", "--settings", '{"sequence": "Q"}', "--out", tmp_path / "Q")
-    assert wrong.returncode == 1 and "Traceback" not in wrong.stderr and wrong.stderr.splitlines()[-1].startswith("error: ")
+    assert wrong.returncode == 2 and "Traceback" not in wrong.stderr
+    assert "error: sequence is Q; give one of A, B, C, " in wrong.stderr.splitlines()[-1]
     # None can be read.
     none = ran("--address", cluster.address, "run", recordings / "empty", "--out", tmp_path / "none")
     assert none.returncode == 1 and "Traceback" not in none.stderr

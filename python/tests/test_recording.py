@@ -44,6 +44,9 @@ def test_choices(rendered: Path) -> None:
     assert [m.frame for m in sparse] == [1, 3, 5] and sparse[1].depth_velocity is None
     back = list(em.run(rendered, observe="sparse", reverse=True, frames=2))
     assert [m.frame for m in back] == [1, 0]
+    # A file of tracks or their settings: what is given says which.
+    few, many = (list(em.run(rendered, observe="sparse", frames=2, tracks={"corners": n}))[1] for n in (60, 600))
+    assert few.motion is not None and many.motion is not None and few.motion.rows < many.motion.rows
     refusals: list[tuple[type[Exception], str, Callable[[], object]]] = [
         (em.ReadError, "nowhere", lambda: em.run(rendered / "nowhere")),
         (ValueError, "start 9 is past", lambda: em.run(rendered, start=9)),
@@ -51,6 +54,8 @@ def test_choices(rendered: Path) -> None:
         (ValueError, "has no depth images", lambda: em.run(rendered, sensor="depth")),
         (ValueError, "no sequence 'other'|no sequence \"other\"", lambda: em.run(rendered, sequence="other")),
         (ValueError, "unknown field", lambda: em.run(rendered, metod="ml")),
+        (ValueError, "unknown field `cornets`", lambda: em.run(rendered, tracks={"cornets": 5})),
+        (em.ReadError, "nowhere.npz", lambda: em.run(rendered, tracks=rendered / "nowhere.npz")),
     ]
     for error, words, call in refusals:
         with pytest.raises(error, match=words):

@@ -406,6 +406,8 @@ class StereoMotion:
         *,
         disparity: npt.ArrayLike | None = None,
         disparity_sigma: npt.ArrayLike | None = None,
+        flow: npt.ArrayLike | None = None,
+        flow_covariance: npt.ArrayLike | None = None,
     ) -> FrameMotion: ...
 
 @final
@@ -583,9 +585,9 @@ def run(
     stride: int = 1,
     reverse: bool = False,
     sensor: Literal["stereo", "depth"] | None = None,
-    disparity: _Path | None = None,
-    flow: _Path | None = None,
-    tracks: _Path | None = None,
+    disparity: _Path | dict[str, Any] | None = None,
+    flow: _Path | dict[str, Any] | None = None,
+    tracks: _Path | dict[str, Any] | None = None,
     mask: _Path | None = None,
     threads: int | None = None,
     **settings: Any,

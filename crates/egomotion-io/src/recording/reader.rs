@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use egomotion::geometry::{Field, Grid, Image};
+use egomotion::geometry::{Grid, Image};
 use egomotion::observe::{DisparityMap, FlowField, RectificationMap, Rectifier};
 use egomotion::pipeline::{DepthCamera, Frame, Unanswered};
 
@@ -187,13 +187,5 @@ fn sigma_folder(folder: &Path) -> Option<PathBuf> {
 fn given_flow(folder: &Path, files: &FrameFiles) -> Result<FlowField, Unanswered> {
     let file = given::find(folder, &files.left, files.index, given::FLOW);
     let [u, v] = given::flow(&file.ok_or(Unanswered::MissingFlow)?).map_err(bad)?;
-    let (width, height) = u.size();
-    let both =
-        |value: f32| Grid::from_fn(width, height, |x, y| if known(&u, &v, x, y) { value } else { f32::NAN });
-    let variance = given::SIGMA_PX * given::SIGMA_PX;
-    Ok(FlowField { cov_uu: both(variance), cov_uv: both(0.0), cov_vv: both(variance), u, v })
-}
-
-fn known(u: &Field, v: &Field, x: usize, y: usize) -> bool {
-    u.get(x, y).is_some() && v.get(x, y).is_some()
+    Ok(FlowField::given(u, v, given::SIGMA_PX))
 }

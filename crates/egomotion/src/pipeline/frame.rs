@@ -55,11 +55,7 @@ impl Frame {
 
     /// Whether its images and maps can be used with a rig.
     pub(super) fn check(&self, rig: &StereoRig) -> Result<(), Unanswered> {
-        let expected = (rig.width_px, rig.height_px);
-        let sized = |what: &str, (w, h): (usize, usize)| {
-            let reason = || format!("the {what} is {w}x{h}, the rig {}x{}", expected.0, expected.1);
-            if (w, h) == expected { Ok(()) } else { Err(Unanswered::BadImage(reason())) }
-        };
+        let sized = |what: &str, size| sized(what, size, rig);
         for (side, image) in [("left", Some(&self.left)), ("right", self.right.as_ref())] {
             let Some(image) = image else { continue };
             sized(&format!("{side} image"), image.size())?;
@@ -85,6 +81,13 @@ impl Frame {
             None => Ok(()),
         }
     }
+}
+
+/// Whether a plane is as wide and high as the rig's images.
+pub(super) fn sized(what: &str, (w, h): (usize, usize), rig: &StereoRig) -> Result<(), Unanswered> {
+    let expected = (rig.width_px, rig.height_px);
+    let reason = || format!("the {what} is {w}x{h}, the rig {}x{}", expected.0, expected.1);
+    if (w, h) == expected { Ok(()) } else { Err(Unanswered::BadImage(reason())) }
 }
 
 /// Standard deviation of the grey levels; NaN if one of them is not a number.

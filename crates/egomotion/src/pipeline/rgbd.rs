@@ -80,7 +80,13 @@ impl DepthNoise {
             Self::StructuredLight { .. } | Self::Stereo { .. } => hand_held,
             Self::TimeOfFlight { .. } => {
                 let e = |n: &str, v: f64| std::env::var(n).map_or(v, |v| v.parse().unwrap());
-                Tolerance { focal: e("TF", 2e-3), centre_px: e("TC", 1.0), scale: e("TS", 2e-3), readout_s: e("TR", 0.03), delay_s: e("TD", 2e-3) }
+                Tolerance {
+                    focal: e("TF", 2e-3),
+                    centre_px: e("TC", 1.0),
+                    scale: e("TS", 2e-3),
+                    readout_s: e("TR", 0.03),
+                    delay_s: e("TD", 2e-3),
+                }
             }
             Self::Exact { .. } => Tolerance::rendered(),
         }

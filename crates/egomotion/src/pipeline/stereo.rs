@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::config::{Config, ConfigError, Observe};
-use super::frame::{Frame, erase, erase_partners};
+use super::frame::{Frame, erase, erase_partners, sized};
 use super::frame_pair::{FramePair, Reference, timed};
 use super::groups::MovingGroup;
 use super::maps::MotionMaps;
@@ -177,6 +177,20 @@ impl StereoMotion {
     /// leads there.
     pub fn set_right_mask(&mut self, mask: Option<Grid<bool>>) {
         self.mask_right = mask;
+    }
+
+    /// Flow of the last frame's left image to the one that comes next: [`Frame::flow`] of whoever knows it only then.
+    ///
+    /// Nothing is done before the first frame; after a bad frame the flow is not used.
+    ///
+    /// # Errors
+    /// [`Unanswered::BadImage`] when it is not of the rig's size.
+    pub fn set_flow(&mut self, flow: FlowField) -> Result<(), Unanswered> {
+        sized("flow", flow.size(), &self.rig)?;
+        if let Some(last) = &mut self.reference {
+            last.flow = Some(flow);
+        }
+        Ok(())
     }
 
     /// The frame that the next one will be matched with.

@@ -75,6 +75,20 @@ impl FlowField {
         Self { u, v, cov_uu: zero.clone(), cov_uv: zero.clone(), cov_vv: zero }
     }
 
+    /// Flow that somebody else has measured, with one standard deviation for all; missing where either component is.
+    pub fn given(u: Field, v: Field, sigma_px: f32) -> Self {
+        let (width, height) = u.size();
+        let known = |x: usize, y: usize| u.get(x, y).and(v.get(x, y)).is_some();
+        let all =
+            |value: f32| Grid::from_fn(width, height, |x, y| if known(x, y) { value } else { f32::NAN });
+        let (variance, none) = (all(sigma_px * sigma_px), all(0.0));
+        let [u, v] = [&u, &v].map(|plane| {
+            let both = |x, y| if known(x, y) { plane.get(x, y).unwrap_or(f32::NAN) } else { f32::NAN };
+            Field::from_grid(Grid::from_fn(width, height, both))
+        });
+        Self { cov_uu: variance.clone(), cov_uv: none, cov_vv: variance, u, v }
+    }
+
     /// (width, height), in pixels.
     pub fn size(&self) -> (usize, usize) {
         self.u.size()
