@@ -157,7 +157,10 @@ fn settings_without_a_meaning_are_named() {
     assert_eq!(own.check(), Ok(()));
     let unknown = refused(OneSetting { sequence: "Z".to_owned(), ..own.clone() });
     assert!(unknown.starts_with("sequence is Z; give one of A, B, C, "), "{unknown}");
-    assert_eq!(refused(OneSetting { step: -1.0, ..own.clone() }), "step is -1.0; give 0.000001 to 1000");
+    assert_eq!(
+        refused(OneSetting { step: -1.0, ..own.clone() }),
+        "step is -1.0; give 0.000001 to 1000000000"
+    );
     assert_eq!(refused(OneSetting { draws: 0, ..own.clone() }), "draws is 0; give 1 to 100000000");
     let with = |measuring| refused(OneSetting { measuring, ..own.clone() });
     let real = Measuring::real();

@@ -6,7 +6,7 @@
 //! would have, keeps them from overruling the prior (the adjustment of composite likelihoods). The covariance is the
 //! sandwich of [`super::blocks`] with the errors eliminated from each block's score, and the prior's own part.
 
-use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::Observability;
@@ -48,7 +48,7 @@ pub fn joint_step(
     let at = At::new(found.motion.phi(), rig);
     let weighing = Weighing { mixture: found.mixture, scale2: found.scale2, blocks };
     let by_block: Vec<Sums> =
-        Moments::by_block(observations, &at, &weighing).iter().map(|m| m.sums(&at, prior)).collect();
+        Raw::by_block(observations, &at, &weighing).iter().map(|m| m.sums(&at, prior)).collect();
     let unit = prior.sigma.map(|sigma| if sigma > 0.0 { sigma.recip() } else { 0.0 });
     let solved = Solved::of(&by_block, &errors.vector().component_mul(&unit))?;
     let moved = errors.vector() + solved.step.fixed_rows::<ERRORS>(6).component_mul(&prior.sigma);
@@ -65,25 +65,41 @@ struct Weighing<'a> {
     blocks: &'a Blocks,
 }
 
-/// The motion of the scene and the calibration; the other errors are motions too, of a part of the observations.
+/// The motion of the scene and the calibration, of which all observations speak.
 const BASE: usize = 6 + CALIBRATION;
 
-/// Sums over the observations of a block, times 1, the image row, its square, and whether it is of a depth image.
-#[derive(Debug, Clone, Copy, Default)]
-struct Moments {
-    information: [SMatrix<f64, BASE, BASE>; 4],
-    /// By how much the score's derivative is less than the information, because weights change as well.
-    reweighting: [SMatrix<f64, BASE, BASE>; 4],
-    score: [SVector<f64, BASE>; 4],
+/// One observation at the estimate.
+struct Weighed {
+    /// −∂e of all unknowns.
+    by_all: SMatrix<f64, 3, ALL>,
+    inverse_cov: Matrix3<f64>,
+    misclosure: Vector3<f64>,
+    /// By how much its weight changes with its misclosure, relative to the weight.
+    reweighting: f64,
 }
 
-impl Moments {
+/// Sums over the observations of a block, by φ's small motion and by the errors in their own units.
+#[derive(Debug, Clone, Copy)]
+struct Raw {
+    information: SMatrix<f64, ALL, ALL>,
+    /// By how much the score's derivative is less than the information, because weights change as well.
+    reweighting: SMatrix<f64, ALL, ALL>,
+    score: SVector<f64, ALL>,
+}
+
+impl Default for Raw {
+    fn default() -> Self {
+        Self { information: SMatrix::zeros(), reweighting: SMatrix::zeros(), score: SVector::zeros() }
+    }
+}
+
+impl Raw {
     fn by_block(observations: &[Sensed], at: &At<'_>, weighing: &Weighing<'_>) -> Vec<Self> {
         let strips: Vec<Vec<(usize, Self)>> =
             observations.par_chunks(STRIP).map(|strip| Self::runs(strip, at, weighing)).collect();
         let mut by_block = vec![Self::default(); weighing.blocks.count()];
-        for (block, moments) in strips.iter().flatten() {
-            by_block[*block].merge(moments);
+        for (block, sums) in strips.iter().flatten() {
+            by_block[*block].merge(sums);
         }
         by_block
     }
@@ -97,8 +113,8 @@ impl Moments {
             if runs.last().is_none_or(|(last, _)| *last != block) {
                 runs.push((block, Self::default()));
             }
-            if let Some((_, moments)) = runs.last_mut() {
-                moments.add(sensed, at, weighing);
+            if let Some((_, sums)) = runs.last_mut() {
+                sums.add(sensed, at, weighing);
             }
         }
         runs
@@ -111,56 +127,49 @@ impl Moments {
         let settled = structure;
         let Some(l) = sensed.track.linearise(&mut structure, at) else { return };
         let Some(by_calibration) = sensed.by_calibration(&settled, at) else { return };
-        let mut by_all = SMatrix::<f64, 3, BASE>::zeros();
+        let mut by_all = SMatrix::<f64, 3, ALL>::zeros();
         by_all.fixed_columns_mut::<6>(0).copy_from(&l.by_motion);
         by_all.fixed_columns_mut::<CALIBRATION>(6).copy_from(&by_calibration);
+        let by_excess = sensed.by_excess(&l.by_motion, at.rig());
+        by_all.fixed_columns_mut::<{ ERRORS - CALIBRATION }>(BASE).copy_from(&by_excess);
         let inverse_cov = l.inverse_cov / weighing.scale2;
         let q = l.misclosure.dot(&product(&inverse_cov, &l.misclosure));
         let (weight, slope) = weighing.mixture.weight(q);
-        let across = by_all.transpose();
-        let weighted = product(&across, &(inverse_cov * weight));
-        let information = product(&weighted, &by_all);
-        let score: SVector<f64, BASE> = product(&weighted, &l.misclosure);
-        let reweighting = product(&(score * (slope / weight.max(f64::MIN_POSITIVE))), &score.transpose());
-        let mut times = |k: usize, factor: f64| {
-            self.information[k] += information * factor;
-            self.reweighting[k] += reweighting * factor;
-            self.score[k] += score * factor;
-        };
-        times(0, 1.0);
+        let reweighting = slope / weight.max(f64::MIN_POSITIVE);
+        let one =
+            Weighed { by_all, inverse_cov: inverse_cov * weight, misclosure: l.misclosure, reweighting };
+        // Of the errors of other parts of the sensor the derivatives are zero.
         match sensed.by {
-            Sensor::Stereo => {}
-            Sensor::Image => {
-                let row = sensed.row(at.rig());
-                times(1, row);
-                times(2, row * row);
+            Sensor::Stereo => self.add_columns::<BASE>(&one, |i| i),
+            Sensor::Image => self.add_columns::<ALL>(&one, |i| i),
+            Sensor::Depth => self.add_columns::<{ BASE + 6 }>(&one, |i| if i < BASE { i } else { i + 6 }),
+        }
+    }
+
+    /// Add what an observation says of K of the unknowns, of which the i-th is `place(i)`.
+    #[inline(always)]
+    fn add_columns<const K: usize>(&mut self, one: &Weighed, place: impl Fn(usize) -> usize) {
+        let by = SMatrix::<f64, 3, K>::from_fn(|r, i| one.by_all[(r, place(i))]);
+        let weighted = product(&by.transpose(), &one.inverse_cov);
+        let (information, score) = (product(&weighted, &by), product(&weighted, &one.misclosure));
+        for j in 0..K {
+            let (column, reweighted) = (place(j), score[j] * one.reweighting);
+            self.score[column] += score[j];
+            for i in 0..K {
+                self.information[(place(i), column)] += information[(i, j)];
+                self.reweighting[(place(i), column)] += score[i] * reweighted;
             }
-            Sensor::Depth => times(3, 1.0),
         }
     }
 
     fn merge(&mut self, other: &Self) {
-        for k in 0..4 {
-            self.information[k] += other.information[k];
-            self.reweighting[k] += other.reweighting[k];
-            self.score[k] += other.score[k];
-        }
+        self.information += other.information;
+        self.reweighting += other.reweighting;
+        self.score += other.score;
     }
 
     /// Sums by φ and by the errors in units of their prior standard deviations.
     fn sums(&self, at: &At<'_>, prior: &SensorPrior) -> Sums {
-        // Errors that are motions follow the calibration: during read-out (moments of the row), then of depth images.
-        let base = |i: usize| if i < BASE { i } else { (i - BASE) % 6 };
-        let kind = |i: usize| if i < BASE { 0 } else { 1 + (i - BASE) / 6 };
-        const MOMENT: [[Option<usize>; 3]; 3] =
-            [[Some(0), Some(1), Some(3)], [Some(1), Some(2), None], [Some(3), None, Some(3)]];
-        let expanded = |moments: &[SMatrix<f64, BASE, BASE>; 4]| {
-            SMatrix::<f64, ALL, ALL>::from_fn(|i, j| {
-                MOMENT[kind(i)][kind(j)].map_or(0.0, |k| moments[k][(base(i), base(j))])
-            })
-        };
-        let score =
-            SVector::<f64, ALL>::from_fn(|i, _| MOMENT[0][kind(i)].map_or(0.0, |k| self.score[k][base(i)]));
         let mut units = SMatrix::<f64, ALL, ALL>::identity();
         units.fixed_view_mut::<6, 6>(0, 0).copy_from(&StereoTrack::by_phi(at));
         for (k, sigma) in prior.sigma.iter().enumerate() {
@@ -168,11 +177,8 @@ impl Moments {
         }
         let across = units.transpose();
         Sums {
-            score: BlockScore {
-                information: across * expanded(&self.information) * units,
-                score: across * score,
-            },
-            reweighting: across * expanded(&self.reweighting) * units,
+            score: BlockScore { information: across * self.information * units, score: across * self.score },
+            reweighting: across * self.reweighting * units,
         }
     }
 }

@@ -6,11 +6,11 @@
 //! observation is undone by [`SensorErrors::corrected`].
 
 use documented::DocumentedFields;
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::measurement::{At, led};
-use crate::geometry::{StereoRig, Twist};
+use crate::geometry::{Gaussian, StereoRig, Twist};
 use crate::observe::StereoTrack;
 
 /// How well a sensor is known: standard deviations; 0 is exact.
@@ -158,17 +158,21 @@ impl SensorErrors {
             let centred = (x - self.centre_px.0, y - self.centre_px.1 * rig.aspect());
             end.mean = Vector3::new(centred.0 / focal, centred.1 / focal, d / depth);
         }
-        let excess = match sensed.by {
-            Sensor::Stereo => None,
-            Sensor::Image => Some(self.during.scaled(sensed.row(rig))),
-            Sensor::Depth => Some(self.apart),
-        };
+        let sensed = Sensed { track, ..*sensed };
+        let rolled = self.during.scaled(sensed.row(rig));
         // Most often there is none, and it costs a projection.
-        if let Some(excess) = excess.filter(|excess| *excess != Twist::zero()) {
-            let undo = |xyd: &Vector3<f64>| rig.project(&excess.exp().inverse().apply(&rig.point(xyd)?));
-            track.after.mean = undo(&track.after.mean).unwrap_or(track.after.mean);
-        }
-        Sensed { track, ..*sensed }
+        let moved = |excess: &Twist, xyd: &Vector3<f64>| match *excess == Twist::zero() {
+            true => Some(*xyd),
+            false => rig.project(&excess.exp().apply(&rig.point(xyd)?)),
+        };
+        let after = match sensed.by {
+            Sensor::Stereo => None,
+            Sensor::Depth => moved(&self.apart.scaled(-1.0), &track.after.mean),
+            Sensor::Image => moved(&rolled.scaled(-1.0), &track.after.mean)
+                .and_then(|place| Some(sensed.read_again(&place, &moved(&self.apart, &place)?))),
+        };
+        let after = Gaussian { mean: after.unwrap_or(track.after.mean), ..track.after };
+        Sensed { track: StereoTrack { after, ..track }, ..sensed }
     }
 }
 
@@ -178,6 +182,45 @@ impl Sensed {
         let before = &self.track.before.mean;
         let height = rig.height_px.max(1) as f64;
         (rig.pixel_from_image(before.x, before.y).1 + 0.5) / height - 0.5
+    }
+
+    /// The slope of the depth image's disparity along x and y around the later place, of which the covariance of the two
+    /// speaks.
+    fn slope(&self) -> Vector2<f64> {
+        let cov = &self.track.after.cov;
+        let place: Matrix2<f64> = cov.fixed_view::<2, 2>(0, 0).into();
+        place.try_inverse().map_or_else(Vector2::zeros, |inverse| inverse * Vector2::new(cov.m13, cov.m23))
+    }
+
+    /// The later end at another `place`, with the disparity that a depth image would have there in which the point were
+    /// not `apart` but at that place.
+    fn read_again(&self, place: &Vector3<f64>, apart: &Vector3<f64>) -> Vector3<f64> {
+        let after = &self.track.after.mean;
+        let d = after.z + self.slope().dot(&(apart - after).xy()) - (apart.z - place.z);
+        Vector3::new(place.x, place.y, d)
+    }
+
+    /// −∂e/∂(motion during read-out, motion apart), given that by φ.
+    pub(super) fn by_excess(
+        &self,
+        by_motion: &SMatrix<f64, 3, 6>,
+        rig: &StereoRig,
+    ) -> SMatrix<f64, 3, { ERRORS - CALIBRATION }> {
+        let mut by_excess = SMatrix::<f64, 3, { ERRORS - CALIBRATION }>::zeros();
+        match self.by {
+            Sensor::Stereo => {}
+            Sensor::Image => {
+                // The image sees the place, the depth image what surface is there.
+                let slope = self.slope();
+                let along = by_motion.row(0) * slope.x + by_motion.row(1) * slope.y;
+                let mut place = *by_motion;
+                place.set_row(2, &along);
+                by_excess.fixed_columns_mut::<6>(0).copy_from(&(place * self.row(rig)));
+                by_excess.fixed_view_mut::<1, 6>(2, 6).copy_from(&(by_motion.row(2) - along));
+            }
+            Sensor::Depth => by_excess.fixed_columns_mut::<6>(6).copy_from(by_motion),
+        }
+        by_excess
     }
 
     /// −∂e/∂(focal length, principal point, scale) of the misclosure e at a structure.
@@ -204,8 +247,9 @@ impl Sensed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Matrix3;
+
     use crate::estimate::measurement::Measurement;
-    use crate::geometry::Gaussian;
 
     #[test]
     fn corrections_and_derivatives_agree() {
@@ -215,19 +259,15 @@ mod tests {
         let at = At::new(phi, &rig);
         let before = Vector3::new(-60.0, 45.0, 12.0);
         let after = rig.project(&phi.exp().apply(&rig.point(&before).unwrap())).unwrap();
-        let end = |mean: Vector3<f64>| Gaussian::independent(mean.into(), [0.1, 0.1, 0.1]);
+        // Disparity read at a place that is not certain, on a slanted surface.
+        let cov = Matrix3::new(0.1, 0.02, 0.006, 0.02, 0.1, -0.003, 0.006, -0.003, 0.1);
+        let end = |mean: Vector3<f64>| Gaussian { mean, cov };
         for by in [Sensor::Stereo, Sensor::Image, Sensor::Depth] {
             let sensed = Sensed { track: StereoTrack { before: end(before), after: end(after) }, by };
             let exact = sensed.track.linearise(&mut before.clone(), &at).unwrap();
             let mut columns = SMatrix::<f64, 3, ERRORS>::zeros();
             columns.fixed_columns_mut::<4>(0).copy_from(&sensed.by_calibration(&before, &at).unwrap());
-            match by {
-                Sensor::Stereo => {}
-                Sensor::Image => {
-                    columns.fixed_columns_mut::<6>(4).copy_from(&(exact.by_motion * sensed.row(&rig)));
-                }
-                Sensor::Depth => columns.fixed_columns_mut::<6>(10).copy_from(&exact.by_motion),
-            }
+            columns.fixed_columns_mut::<12>(4).copy_from(&sensed.by_excess(&exact.by_motion, &rig));
             for k in 0..ERRORS {
                 let misclosure = |h: f64| {
                     let errors = SensorErrors::from_vector(&(SVector::ith(k, h)));

@@ -16,7 +16,7 @@ use crate::study::range::{COUNTS, OutOfRange, sequences, within};
 use setting::{Score, Setting, merged};
 
 /// STEP of a single setting.
-const STEPS: RangeInclusive<f64> = 1e-6..=1000.0;
+const STEPS: RangeInclusive<f64> = 1e-6..=1e9;
 /// Draws that one part of a single setting takes.
 const DRAWS_PER_PART: usize = 10;
 /// Columns of the study's file.
