@@ -2,7 +2,7 @@
 
 use egomotion::estimate::Unsolvable;
 use egomotion::estimate::alignment::{self, Fitting, Form, PointPair};
-use egomotion::estimate::lmeds::LmedsOptions;
+use egomotion::estimate::linear::lmeds::LmedsOptions;
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

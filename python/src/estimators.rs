@@ -1,9 +1,10 @@
 //! Estimators on rows of equations.
 
-use egomotion::estimate::least_squares::{self as squares, Weighting};
-use egomotion::estimate::lmeds::{self as median, LmedsOptions};
-use egomotion::estimate::m_estimator::{StudentT, m_estimate};
-use egomotion::estimate::{Fit, Row, Unsolvable, two_step as steps};
+use egomotion::estimate::linear::least_squares::{self as squares, Weighting};
+use egomotion::estimate::linear::lmeds::{self as median, LmedsOptions};
+use egomotion::estimate::linear::m_estimator::{StudentT, m_estimate};
+use egomotion::estimate::linear::two_step as steps;
+use egomotion::estimate::{Fit, Row, Unsolvable};
 use nalgebra::SVector;
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use egomotion::metrics::Alignment;
+use egomotion::metrics::TrajectoryAlignment;
 use egomotion_io::evaluation::{Evaluation, Options};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -32,7 +32,7 @@ pub fn evaluate(
     truth_sigma: Option<(f64, f64)>,
 ) -> PyResult<Py<PyAny>> {
     let own = Options::default();
-    let known = [Alignment::None, Alignment::Se3, Alignment::Sim3];
+    let known = [TrajectoryAlignment::None, TrajectoryAlignment::Se3, TrajectoryAlignment::Sim3];
     let alignment = known.into_iter().find(|known| known.name() == align);
     let by_time = match associate {
         "time" => true,

@@ -1,8 +1,8 @@
 //! Estimators on what was measured: maximum likelihood with its bound, and errors in variables.
 
-use egomotion::estimate::errors_in_variables as variables;
-use egomotion::estimate::m_estimator::StudentT;
-use egomotion::estimate::maximum_likelihood as likelihood;
+use egomotion::estimate::likelihood::maximum_likelihood as likelihood;
+use egomotion::estimate::linear::errors_in_variables as variables;
+use egomotion::estimate::linear::m_estimator::StudentT;
 use egomotion::estimate::{Blocks, Unsolvable};
 use egomotion::geometry::Twist;
 use numpy::PyArray2;

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use egomotion::study::assumptions::Assumptions;
-use egomotion::study::consistency::Consistency;
-use egomotion::study::efficiency::Efficiency;
-use egomotion::study::real::LabStudy;
-use egomotion::study::sensitivity::{OneSetting, Sensitivity};
-use egomotion::study::uncertainty::Uncertainty;
-use egomotion::study::{Cell, Publication, Study as Parts, Table};
+use egomotion_study::assumptions::Assumptions;
+use egomotion_study::consistency::Consistency;
+use egomotion_study::efficiency::Efficiency;
+use egomotion_study::real::LabStudy;
+use egomotion_study::sensitivity::{OneSetting, Sensitivity};
+use egomotion_study::uncertainty::Uncertainty;
+use egomotion_study::{Cell, Publication, Study as Parts, Table};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

@@ -13,13 +13,13 @@ use egomotion::sim::{SensorNoise, Sequence, StereoImages};
 use crate::Ending;
 use crate::args::DemoArgs;
 use crate::judge::MapTally;
-use crate::report::Eyes;
 use crate::results::{About, ResultFolder};
 use crate::run::set_threads;
 use crate::session::{Outcome, Row, Session, progress, stop_signal};
 use crate::summary::Summary;
 use crate::terminal;
 use egomotion_io::recording::{Fetched, Given};
+use egomotion_report::run::Eyes;
 
 /// Rays along each side of a pixel that shows an edge.
 const SAMPLES: usize = 3;

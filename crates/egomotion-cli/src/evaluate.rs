@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use anyhow::Result;
-use egomotion::metrics::Alignment;
+use egomotion::metrics::TrajectoryAlignment;
 use egomotion_io::evaluation::{Evaluation, Options, Stated};
 
 use crate::args::EvaluateArgs;
@@ -59,7 +59,7 @@ fn text(found: &Evaluation, options: &Options) -> String {
         ),
     };
     if let Some(absolute) = &found.absolute_m {
-        let scale = if found.alignment == Alignment::Sim3 {
+        let scale = if found.alignment == TrajectoryAlignment::Sim3 {
             format!(", scale {:.5}", found.scale)
         } else {
             String::new()
@@ -86,10 +86,10 @@ fn in_words(stated: &Stated) -> String {
     )
 }
 
-fn words(alignment: Alignment) -> &'static str {
+fn words(alignment: TrajectoryAlignment) -> &'static str {
     match alignment {
-        Alignment::None => "as given",
-        Alignment::Se3 => "laid over the truth",
-        Alignment::Sim3 => "laid over the truth and scaled",
+        TrajectoryAlignment::None => "as given",
+        TrajectoryAlignment::Se3 => "laid over the truth",
+        TrajectoryAlignment::Sim3 => "laid over the truth and scaled",
     }
 }

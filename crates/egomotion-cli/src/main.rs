@@ -1,7 +1,9 @@
 //! The command `egomotion`.
+#![deny(clippy::disallowed_methods)]
+#![warn(clippy::too_many_lines)]
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 mod args;
-mod chart;
 mod config;
 mod demo;
 mod evaluate;
@@ -12,7 +14,6 @@ mod maps;
 mod memory;
 mod moving;
 mod pairs;
-mod report;
 mod results;
 mod run;
 mod session;

@@ -14,7 +14,7 @@ use egomotion_io::{disparity_png, flo, flow_png, image, npy, pfm, write};
 use nalgebra::Vector3;
 
 use crate::args::{CloudArg, MapFormat};
-use crate::chart::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Spread, VIRIDIS};
+use egomotion_report::chart::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Spread, VIRIDIS};
 
 /// Which files are written of each frame pair.
 #[derive(Debug, Clone, Default)]

@@ -11,9 +11,9 @@ use egomotion_io::write;
 use serde::Serialize;
 
 use crate::moving;
-use crate::report::{self, Eyes, FrameRow, Report, Scene};
 use crate::session::{Outcome, Row};
 use crate::summary::{Index, SceneEntry};
+use egomotion_report::run::{Eyes, FrameRow, Report, Scene};
 
 /// A folder that results go to.
 pub struct ResultFolder {
@@ -119,7 +119,7 @@ impl ResultFolder {
                 status: status(row).to_owned(),
             })
             .collect();
-        let page = report::render(&Report {
+        let page = egomotion_report::run::render(&Report {
             title: about.title.to_owned(),
             source: about.source.to_owned(),
             command: about.command.clone(),
@@ -142,7 +142,7 @@ impl ResultFolder {
     /// Write `report.html` of a set of scenes, which links to theirs.
     pub fn write_index(&self, command: &str, index: &Index) -> Result<()> {
         let scenes: Vec<Scene> = index.scenes.iter().map(|scene| listed(scene, &self.path)).collect();
-        let page = report::render_index(&index.source, command, index.complete, &scenes);
+        let page = egomotion_report::run::render_index(&index.source, command, index.complete, &scenes);
         self.write("report.html", page.as_bytes())
     }
 }

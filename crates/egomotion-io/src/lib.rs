@@ -15,6 +15,9 @@
 //! # Ok::<(), IoError>(())
 //! ```
 #![deny(missing_docs)]
+#![deny(clippy::disallowed_methods)]
+#![warn(clippy::too_many_lines)]
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod calibration;
 pub mod depth;

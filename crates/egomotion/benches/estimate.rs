@@ -7,10 +7,10 @@ mod street;
 
 use criterion::Criterion;
 use egomotion::estimate::Row;
-use egomotion::estimate::least_squares::Weighting;
-use egomotion::estimate::lmeds::{LmedsOptions, lmeds, plain_search, random_subsets, search, trials};
-use egomotion::estimate::systematic::common_errors;
-use egomotion::estimate::tolerance::Sensor;
+use egomotion::estimate::linear::least_squares::Weighting;
+use egomotion::estimate::linear::lmeds::{LmedsOptions, lmeds, plain_search, random_subsets, search, trials};
+use egomotion::estimate::sensor::systematic::common_errors;
+use egomotion::estimate::sensor::tolerance::TrackSource;
 use egomotion::geometry::Twist;
 use egomotion::motion::depth_velocity::{DisparityOffset, RigidPrediction};
 use egomotion::observe::tracks::{Hints, stereo_tracks};
@@ -34,8 +34,9 @@ fn estimation(c: &mut Criterion) {
     let tracks = stereo_tracks(&before, &after, &rig, Hints::default(), &config.tracks);
     let pair =
         DensePair { rig: &rig, before: &maps.0, after: &maps.1, flow: &flow, flow_right: None, given: false };
-    let start =
-        solve(&Observed::Sparse(&tracks, Sensor::Stereo), &rig, &Twist::zero(), &config, 0.1).unwrap().phi();
+    let start = solve(&Observed::Sparse(&tracks, TrackSource::Stereo), &rig, &Twist::zero(), &config, 0.1)
+        .unwrap()
+        .phi();
 
     c.bench_function("dense observations", |b| {
         b.iter(|| pair.every(config.sample_step_px, DensePair::stereo_track));

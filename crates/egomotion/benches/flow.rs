@@ -6,7 +6,7 @@ mod street;
 
 use criterion::Criterion;
 use egomotion::geometry::Twist;
-use egomotion::observe::flow::{Camera, FlowPair, FlowSpace, rigid_flow};
+use egomotion::observe::flow::{FlowPair, FlowSpace, Side, rigid_flow};
 use egomotion::observe::spline::coefficients;
 use egomotion::observe::{DisparityMatcher, DisparityOptions, FlowOptions, StereoPyramid};
 use nalgebra::Vector3;
@@ -20,12 +20,12 @@ fn flow(c: &mut Criterion) {
     // About what the car does here from frame to frame.
     let phi = Twist { t: Vector3::new(0.0, 0.0, -1.17), omega: Vector3::zeros() };
     let [before, after] = [0, 2].map(|k| StereoPyramid::new(&images[k], &images[k + 1], LEVELS));
-    for camera in [Camera::Left, Camera::Right] {
+    for camera in [Side::Left, Side::Right] {
         c.bench_function(&format!("rigid flow, {camera:?}"), |b| {
             b.iter(|| rigid_flow(&disparity, &rig, &phi, camera));
         });
     }
-    let prediction = rigid_flow(&disparity, &rig, &phi, Camera::Left);
+    let prediction = rigid_flow(&disparity, &rig, &phi, Side::Left);
     let mut space = FlowSpace::default();
     let pair = FlowPair { from: &before.left, to: &after.left, to_spline: Some(&after.left_spline) };
     let options = FlowOptions::default();

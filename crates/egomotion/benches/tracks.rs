@@ -5,8 +5,8 @@
 mod street;
 
 use criterion::Criterion;
-use egomotion::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
-use egomotion::estimate::robust_start::robust_start;
+use egomotion::estimate::likelihood::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
+use egomotion::estimate::likelihood::robust_start::robust_start;
 use egomotion::observe::StereoPyramid;
 use egomotion::observe::row_disagreement::row_disagreement;
 use egomotion::observe::tracks::{Expected, Hints, TrackOptions, follow, measured, stereo_corners};

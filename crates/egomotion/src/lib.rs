@@ -1,8 +1,8 @@
 //! 3D motion, depth velocity and time to impact from stereo, each with an uncertainty that can be trusted.
 //!
 //! The modules follow the way of the data; each imports only from those before it:
-//! [`geometry`], [`observe`], [`constrain`], [`estimate`], [`motion`], [`pipeline`]. Beside them stand [`sim`],
-//! which needs geometry alone, and [`metrics`]; [`study`] looks at all of them.
+//! [`geometry`], [`observe`], [`constrain`], [`estimate`], [`motion`], [`pipeline`]. Beside them stand [`sim`]
+//! and [`metrics`], which need geometry alone.
 //!
 //! Two rendered frames in, the motion of the scene between them out:
 //!
@@ -26,6 +26,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![deny(missing_docs)]
+#![deny(clippy::disallowed_methods)]
+#![warn(clippy::too_many_lines)]
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod constrain;
 pub mod estimate;
@@ -35,4 +38,4 @@ pub mod motion;
 pub mod observe;
 pub mod pipeline;
 pub mod sim;
-pub mod study;
+mod simd;

@@ -8,11 +8,11 @@ mod scattered;
 
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
 use egomotion::estimate::alignment::{Fitting, Form, PointPair, align};
-use egomotion::estimate::least_squares::{Weighting, least_squares};
-use egomotion::estimate::lmeds::{LmedsOptions, lmeds, robust_scale};
-use egomotion::estimate::m_estimator::{StudentT, m_estimate};
-use egomotion::estimate::maximum_likelihood::maximum_likelihood;
-use egomotion::estimate::two_step::two_step;
+use egomotion::estimate::likelihood::maximum_likelihood::maximum_likelihood;
+use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
+use egomotion::estimate::linear::lmeds::{LmedsOptions, lmeds, robust_scale};
+use egomotion::estimate::linear::m_estimator::{StudentT, m_estimate};
+use egomotion::estimate::linear::two_step::two_step;
 use egomotion::estimate::{Blocks, Row, median};
 use egomotion::geometry::{Gaussian, StereoRig, Twist};
 use egomotion::metrics::{Coverage, Nees};

@@ -4,11 +4,12 @@
 
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
 use egomotion::estimate::alignment::{Fitting, Form, Moments, PointPair, align};
-use egomotion::estimate::least_squares::{Weighting, least_squares};
-use egomotion::estimate::lmeds::{self, LmedsOptions};
-use egomotion::estimate::m_estimator::StudentT;
-use egomotion::estimate::maximum_likelihood::{cramer_rao_bound, maximum_likelihood};
-use egomotion::estimate::{NormalEquations, Row, two_step::two_step};
+use egomotion::estimate::likelihood::maximum_likelihood::{cramer_rao_bound, maximum_likelihood};
+use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
+use egomotion::estimate::linear::lmeds::{self, LmedsOptions};
+use egomotion::estimate::linear::m_estimator::StudentT;
+use egomotion::estimate::linear::two_step::two_step;
+use egomotion::estimate::{NormalEquations, Row};
 use egomotion::geometry::perspective::{image_flow as flow_of, image_velocity};
 use egomotion::geometry::{Field, Gaussian, Grid, RigidMotion, StereoRig, Twist};
 use egomotion::motion::depth_velocity as vz;

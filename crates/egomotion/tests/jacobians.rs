@@ -4,9 +4,9 @@ mod scattered;
 
 use egomotion::constrain::{LinearConstraint, binocular_flow, dcce, image_flow};
 use egomotion::estimate::Row;
-use egomotion::estimate::least_squares::{Weighting, least_squares};
-use egomotion::estimate::m_estimator::{StudentT, m_estimate};
-use egomotion::estimate::maximum_likelihood::maximum_likelihood;
+use egomotion::estimate::likelihood::maximum_likelihood::maximum_likelihood;
+use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
+use egomotion::estimate::linear::m_estimator::{StudentT, m_estimate};
 use egomotion::estimate::measurement::Measurement;
 use egomotion::geometry::{Gaussian, RigidMotion, Twist};
 use egomotion::motion::DepthVelocity;

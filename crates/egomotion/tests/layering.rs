@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 
 /// Top-level modules and what each may import besides itself.
 const ALLOWED: [(&str, &[&str]); 9] = [
-    ("geometry", &[]),
-    ("observe", &["geometry"]),
+    ("simd", &[]),
+    ("geometry", &["simd"]),
+    ("observe", &["geometry", "simd"]),
     ("constrain", &["geometry", "observe"]),
-    ("estimate", &["geometry", "observe", "constrain"]),
+    ("estimate", &["geometry", "observe", "constrain", "simd"]),
     ("motion", &["geometry", "observe", "constrain", "estimate"]),
-    ("pipeline", &["geometry", "observe", "constrain", "estimate", "motion"]),
-    ("study", &["geometry", "observe", "constrain", "estimate", "motion", "pipeline", "sim", "metrics"]),
-    ("sim", &["geometry"]),
+    ("pipeline", &["geometry", "observe", "constrain", "estimate", "motion", "simd"]),
+    ("sim", &["geometry", "simd"]),
     ("metrics", &["geometry"]),
 ];
 

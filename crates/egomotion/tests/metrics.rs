@@ -4,8 +4,8 @@
 use approx::assert_relative_eq;
 use egomotion::geometry::{Gaussian, RigidMotion};
 use egomotion::metrics::{
-    Alignment, Coverage, Delta, KITTI_LENGTHS_M, Nees, SectionSeven, align, associate, kitti_drift, pairs,
-    quantile, relative_pose_error, travelled_m,
+    Coverage, Delta, KITTI_LENGTHS_M, Nees, SectionSeven, TrajectoryAlignment, align, associate, kitti_drift,
+    pairs, quantile, relative_pose_error, travelled_m,
 };
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 use rand::SeedableRng;
@@ -176,15 +176,15 @@ fn a_moved_and_scaled_trajectory_is_laid_back() {
             RigidMotion { translation: moved.translation * 0.25, ..moved }
         })
         .collect();
-    let found = align(&moved, &truth, Alignment::Sim3).unwrap();
+    let found = align(&moved, &truth, TrajectoryAlignment::Sim3).unwrap();
     assert_relative_eq!(found.scale, 4.0, max_relative = 1e-9);
     for (moved, truth) in moved.iter().zip(&truth) {
         let back = found.apply(moved);
         assert!((back.translation - truth.translation).norm() < 1e-9);
         assert!((back.rotation - truth.rotation).amax() < 1e-9);
     }
-    assert_eq!(align(&moved, &truth, Alignment::Se3).unwrap().scale, 1.0);
+    assert_eq!(align(&moved, &truth, TrajectoryAlignment::Se3).unwrap().scale, 1.0);
     // A line leaves the turn about it open.
     let line: Vec<RigidMotion> = (0..5).map(|k| pose(0.0, 0.0, [0.0, 0.0, f64::from(k)])).collect();
-    assert_eq!(align(&line, &line, Alignment::Se3), None);
+    assert_eq!(align(&line, &line, TrajectoryAlignment::Se3), None);
 }

@@ -3,11 +3,11 @@
 mod scattered;
 
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
-use egomotion::estimate::errors_in_variables::errors_in_variables;
-use egomotion::estimate::least_squares::{Weighting, least_squares};
-use egomotion::estimate::m_estimator::StudentT;
-use egomotion::estimate::maximum_likelihood::maximum_likelihood;
-use egomotion::estimate::two_step::two_step;
+use egomotion::estimate::likelihood::maximum_likelihood::maximum_likelihood;
+use egomotion::estimate::linear::errors_in_variables::errors_in_variables;
+use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
+use egomotion::estimate::linear::m_estimator::StudentT;
+use egomotion::estimate::linear::two_step::two_step;
 use egomotion::estimate::{Blocks, MotionEstimate, Row, Unsolvable};
 use egomotion::geometry::{Gaussian, StereoRig, Twist};
 use egomotion::observe::{DepthChange, DepthFlow};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use egomotion::geometry::upper_median;
-use egomotion::motion::obstacle::Belief;
+use egomotion::motion::obstacle::ObstacleCriteria;
 use egomotion::pipeline::{Config, StereoFrame, StereoMotion};
 use egomotion::sim::{SensorNoise, Sequence};
 
@@ -14,8 +14,8 @@ const LEAST_CELLS: usize = 4;
 /// surface the cells of which a quarter crosses the window, their medians, and of these the tenth that comes first.
 /// And whether that surface is ahead.
 fn truth_s(sequence: &Sequence, k: usize) -> Option<(f64, bool)> {
-    let (view, motion, window) = (sequence.view(k)?, sequence.phi(k)?.exp(), Config::default().window);
-    let cell = Belief::DENSE.cell_px;
+    let (view, motion, window) = (sequence.view(k)?, sequence.phi(k)?.exp(), Config::default().vehicle);
+    let cell = ObstacleCriteria::DENSE.cell_px;
     let mut cells: BTreeMap<(u16, usize, usize), Vec<f64>> = BTreeMap::new();
     for (u, v) in (0..sequence.rig.height_px).flat_map(|v| (0..sequence.rig.width_px).map(move |u| (u, v))) {
         let Some(truth) = view.truth_at(u as f64, v as f64) else { continue };

@@ -5,12 +5,12 @@ mod scattered;
 
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
 use egomotion::estimate::alignment::{Fitting, Form, PointPair, align};
-use egomotion::estimate::least_squares::{Weighting, least_squares};
-use egomotion::estimate::lmeds::{LmedsOptions, lmeds};
-use egomotion::estimate::m_estimator::{StudentT, m_estimate};
-use egomotion::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
-use egomotion::estimate::robust_start::robust_start;
-use egomotion::estimate::two_step::two_step;
+use egomotion::estimate::likelihood::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
+use egomotion::estimate::likelihood::robust_start::robust_start;
+use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
+use egomotion::estimate::linear::lmeds::{LmedsOptions, lmeds};
+use egomotion::estimate::linear::m_estimator::{StudentT, m_estimate};
+use egomotion::estimate::linear::two_step::two_step;
 use egomotion::estimate::{Blocks, Fit, MotionEstimate, Row, Unsolvable};
 use egomotion::geometry::{Gaussian, StereoRig, Twist};
 use egomotion::observe::{StereoFlow, StereoTrack};

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use egomotion::metrics::{Alignment, Delta};
+use egomotion::metrics::{Delta, TrajectoryAlignment};
 use egomotion_io::evaluation::Options;
 use egomotion_io::trajectory::Format;
 
@@ -69,7 +69,7 @@ pub enum AlignArg {
     Sim3,
 }
 
-impl From<AlignArg> for Alignment {
+impl From<AlignArg> for TrajectoryAlignment {
     fn from(value: AlignArg) -> Self {
         match value {
             AlignArg::None => Self::None,

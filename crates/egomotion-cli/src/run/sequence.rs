@@ -11,11 +11,11 @@ use egomotion_io::source::Sequence;
 use super::resume::{self, Settings};
 use crate::args::RunArgs;
 use crate::judge::{self, MapVerdict};
-use crate::report::Eyes;
 use crate::results::{About, ResultFolder};
 use crate::session::{Outcome, Row, Session, progress};
 use crate::summary::{Cameras, Summary};
 use crate::{Usage, refusal, terminal};
+use egomotion_report::run::Eyes;
 
 /// A finished sequence.
 pub struct DoneSequence {

@@ -15,11 +15,11 @@ use egomotion_io::stream::{ImageStream, Kind};
 use serde_json::{Value, json};
 
 use crate::args::RunArgs;
-use crate::report::Eyes;
 use crate::results::{About, ResultFolder, motion_row};
 use crate::session::{Row, Session, progress, stop_signal};
 use crate::summary::Summary;
 use crate::{Ending, Usage, terminal};
+use egomotion_report::run::Eyes;
 
 /// What errors call the stream, and the folder of its results.
 const NAME: (&str, &str) = ("standard input", "egomotion-out/stdin");

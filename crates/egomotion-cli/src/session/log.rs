@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Row;
 use crate::journal::{Journal, Parts};
-use crate::report::FramePictures;
+use egomotion_report::run::FramePictures;
 
 /// Longest time between two writes, in milliseconds.
 const LONGEST_MS: f64 = 1e4;

@@ -14,8 +14,8 @@ use egomotion_io::recording::{Fetched, with_frames};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
-use crate::report::Album;
 use crate::terminal::tell;
+use egomotion_report::run::Album;
 pub use log::Log;
 use work::Work;
 

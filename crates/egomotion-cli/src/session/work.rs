@@ -11,7 +11,7 @@ use super::log::{DoneFrame, Log, Picture};
 use super::tally::Tally;
 use super::{Outcome, Row, Session};
 use crate::journal::ANEW;
-use crate::report::{Album, FramePictures};
+use egomotion_report::run::{Album, FramePictures};
 
 pub struct Work<'a> {
     session: &'a Session<'a>,

@@ -8,15 +8,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
-use egomotion::study::Study;
+use egomotion_study::Study;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::page::{self, Chapter};
-use super::{figure, table};
-use crate::chart::number::count;
+use super::table;
 use crate::journal::{Head, Journal, Parts};
 use crate::results::ResultFolder;
 use crate::{Ending, terminal};
+use egomotion_report::chart::number::count;
+use egomotion_report::study::figure;
+use egomotion_report::study::page::{self, Chapter};
 
 /// Where studies are run, one after another; their results share a folder and a page.
 pub struct Laboratory {
@@ -160,7 +161,8 @@ impl Laboratory {
             chapter.figures.push(name);
         }
         self.chapters.push(chapter);
-        self.folder.write(page::NAME, page::render(&self.chapters, &self.options).as_bytes())
+        let page = page::render(&self.chapters, self.options.title.as_deref(), &self.options.command);
+        self.folder.write(page::NAME, page.as_bytes())
     }
 
     /// A name for a file that no other file of this laboratory has.

@@ -1,9 +1,7 @@
-//! `egomotion study`: the paper's laboratory. Any [`egomotion::study::Study`] becomes files and one page.
+//! `egomotion study`: the paper's laboratory. Any [`egomotion_study::Study`] becomes files and one page.
 
 mod args;
-mod figure;
 mod laboratory;
-mod page;
 mod real;
 mod table;
 #[cfg(test)]
@@ -11,13 +9,13 @@ mod tests;
 
 use anyhow::Result;
 use egomotion::pipeline::Observe;
-use egomotion::study::assumptions::Assumptions;
-use egomotion::study::consistency::{Consistency, DepthKind, Sensor};
-use egomotion::study::draw::Measuring;
-use egomotion::study::efficiency::Efficiency;
-use egomotion::study::real::LabStudy;
-use egomotion::study::sensitivity::{OneSetting, Sensitivity};
-use egomotion::study::uncertainty::Uncertainty;
+use egomotion_study::assumptions::Assumptions;
+use egomotion_study::consistency::{Consistency, DepthKind, RenderedSensor};
+use egomotion_study::draw::Measuring;
+use egomotion_study::efficiency::Efficiency;
+use egomotion_study::real::LabStudy;
+use egomotion_study::sensitivity::{OneSetting, Sensitivity};
+use egomotion_study::uncertainty::Uncertainty;
 
 use crate::run::set_threads;
 use crate::session::stop_signal;
@@ -86,10 +84,10 @@ fn consistency(args: &ConsistencyArgs) -> Consistency {
         width_px: args.size.0,
         height_px: args.size.1,
         sensor: match args.sensor {
-            PairSensor::Stereo => Sensor::Stereo,
-            PairSensor::Kinect => Sensor::Depth(DepthKind::Kinect),
-            PairSensor::TimeOfFlight => Sensor::Depth(DepthKind::TimeOfFlight),
-            PairSensor::Rendered => Sensor::Depth(DepthKind::Rendered),
+            PairSensor::Stereo => RenderedSensor::Stereo,
+            PairSensor::Kinect => RenderedSensor::Depth(DepthKind::Kinect),
+            PairSensor::TimeOfFlight => RenderedSensor::Depth(DepthKind::TimeOfFlight),
+            PairSensor::Rendered => RenderedSensor::Depth(DepthKind::Rendered),
         },
         observe: if args.sparse { Observe::Sparse } else { Observe::Dense },
         pairs: args.laboratory.draws.unwrap_or(own.pairs),
@@ -108,7 +106,7 @@ fn efficiency(args: &EfficiencyArgs) -> Efficiency {
 }
 
 /// Run one study into its folder.
-fn alone<S: egomotion::study::Study>(args: &LaboratoryArgs, study: &S) -> Result<Ending> {
+fn alone<S: egomotion_study::Study>(args: &LaboratoryArgs, study: &S) -> Result<Ending> {
     let mut laboratory = open(args, Some(study.name()), None)?;
     laboratory.run(study)?;
     laboratory.close()

@@ -6,11 +6,11 @@ use anyhow::{Context, Result, bail};
 use egomotion::geometry::{RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::Unanswered;
 use egomotion::sim::StereoImages;
-use egomotion::study::real::recording::{Measuring, Triple, publish};
-use egomotion::study::real::{Draw, LabStudy, RealError, Record};
-use egomotion::study::{Publication, Study};
 use egomotion_io::recording::Reader;
 use egomotion_io::source::{FrameFiles, Source};
+use egomotion_study::real::recording::{Measuring, Triple, publish};
+use egomotion_study::real::{Draw, LabStudy, RealError, Record};
+use egomotion_study::{Publication, Study};
 use serde::Serialize;
 
 use super::alone;

@@ -6,13 +6,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use egomotion::study::{Axis, Cell, Content, Figure, Line, Panel, Point, Publication, Series, Study, Table};
+use egomotion_study::{Axis, Cell, Content, Figure, Line, Panel, Point, Publication, Series, Study, Table};
 use serde::{Deserialize, Serialize};
 use tempfile::TempDir;
 
 use super::laboratory::{Laboratory, Options};
-use super::page;
 use crate::Ending;
+use egomotion_report::study::page;
 
 /// A study of some parts, each with numbers that are hard to keep.
 #[derive(Debug, Clone, Serialize)]

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use egomotion::geometry::RigidMotion;
 use egomotion::metrics::{
-    Alignment, Delta, Drift, KITTI_LENGTHS_M, RelativePoseError, Spread, absolute_errors_m, align,
+    Delta, Drift, KITTI_LENGTHS_M, RelativePoseError, Spread, TrajectoryAlignment, absolute_errors_m, align,
     kitti_drift, pairs, relative_pose_error, relative_pose_errors,
 };
 
@@ -28,7 +28,7 @@ pub struct Options {
     /// Time stamps farther apart than this do not belong to each other, in seconds.
     pub largest_gap_s: f64,
     /// What is laid over the truth before positions are compared.
-    pub alignment: Alignment,
+    pub alignment: TrajectoryAlignment,
     /// Lengths of path over which drift is measured, in metres.
     pub lengths_m: Vec<f64>,
     /// Distances over which relative motions are compared, each with its name.
@@ -44,7 +44,7 @@ impl Default for Options {
             format: None,
             by_time: true,
             largest_gap_s: 0.01,
-            alignment: Alignment::Se3,
+            alignment: TrajectoryAlignment::Se3,
             lengths_m: KITTI_LENGTHS_M.to_vec(),
             deltas: vec![("1s".to_owned(), Delta::Seconds(1.0)), ("1m".to_owned(), Delta::Metres(1.0))],
             truth_sigma: [0.0; 6],
@@ -77,7 +77,7 @@ pub struct Evaluation {
     /// Drift; `None` where the path is shorter than all lengths.
     pub drift: Option<Drift>,
     /// What was laid over the truth; nothing where the positions determine no alignment.
-    pub alignment: Alignment,
+    pub alignment: TrajectoryAlignment,
     /// The scale of that.
     pub scale: f64,
     /// Errors of position, in metres.
@@ -102,7 +102,7 @@ impl Evaluation {
         let laid = align(&compared.estimate, true_poses, alignment).or_else(|| {
             let words = "the positions lie on a line or a point, and determine no alignment: none is made";
             warnings.push(words.to_owned());
-            alignment = Alignment::None;
+            alignment = TrajectoryAlignment::None;
             align(&compared.estimate, true_poses, alignment)
         });
         let laid =

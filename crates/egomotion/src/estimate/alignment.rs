@@ -2,9 +2,10 @@
 
 use nalgebra::{Matrix3, Vector3, Vector6};
 
-use super::lmeds::{LmedsOptions, robust_scale, trials};
-use super::m_estimator::{LEAST_SCALE2, StudentT};
-use super::{Estimate, MotionEstimate, Undetermined, Unsolvable, blocks, median};
+use crate::estimate::certainty::blocks;
+use crate::estimate::linear::lmeds::{LmedsOptions, robust_scale, trials};
+use crate::estimate::linear::m_estimator::{LEAST_SCALE2, StudentT};
+use crate::estimate::{Estimate, MotionEstimate, Undetermined, Unsolvable, median};
 use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
 use crate::observe::StereoTrack;
 
@@ -235,7 +236,7 @@ fn lmeds_weights(
     let mut squares = vec![0.0; pairs.len()];
     // Subsets of four serve both forms: a rotation uses the first three.
     if pairs.len() >= 4 {
-        for four in super::lmeds::random_subsets::<4>(pairs.len(), count, options.seed) {
+        for four in crate::estimate::linear::lmeds::random_subsets::<4>(pairs.len(), count, options.seed) {
             let chosen = four[..subset].iter().map(|&i| (&pairs[i], 1.0));
             let Some(alignment) = Moments::over(chosen).align(form) else { continue };
             squares.iter_mut().zip(pairs).for_each(|(s, pair)| *s = alignment.square(pair));

@@ -3,7 +3,7 @@
 use nalgebra::{ArrayStorage, Matrix3, Matrix6, SMatrix, Vector3, Vector4};
 
 use super::median;
-use super::step::{self, Step, Weighing};
+use crate::estimate::likelihood::step::{self, Step, Weighing};
 use crate::geometry::gaussian::{accumulate, product};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::{StereoFlow, StereoTrack};
@@ -38,7 +38,7 @@ pub struct Linearised {
     /// ∂e per pixel by which every disparity is too large, before and after.
     pub(super) by_offset: Vector3<f64>,
     /// ∂e per pixel of the amplitude by which x, y, and disparity (of flows the right camera's x) err with
-    /// their sub-pixel phase, one a column; see [`super::systematic`].
+    /// their sub-pixel phase, one a column; see [`crate::estimate::sensor::systematic`].
     pub(super) by_phase: Matrix3<f64>,
 }
 

@@ -2,24 +2,11 @@
 
 pub mod alignment;
 mod array;
-pub mod blocks;
-pub mod errors_in_variables;
-pub mod joint;
-pub mod least_squares;
-pub mod lmeds;
-pub mod m_estimator;
-pub mod maximum_likelihood;
+pub mod certainty;
+pub mod likelihood;
+pub mod linear;
 pub mod measurement;
-pub mod median_search;
-pub mod mixture;
-pub mod observability;
-pub mod robust_start;
-pub mod row;
-mod step;
-pub mod systematic;
-pub mod tolerance;
-pub mod two_step;
-pub mod undetermined;
+pub mod sensor;
 
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -27,11 +14,12 @@ use thiserror::Error;
 
 use crate::geometry::{Gaussian, Twist};
 
-pub use blocks::Blocks;
-pub use observability::Observability;
-pub use row::{NormalEquations, Row};
-pub use tolerance::Tolerance;
-pub use undetermined::{FreeMotion, Undetermined};
+use certainty::blocks;
+pub use certainty::blocks::Blocks;
+pub use certainty::observability::Observability;
+pub use certainty::undetermined::{FreeMotion, Undetermined};
+pub use linear::row::{NormalEquations, Row};
+pub use sensor::tolerance::Tolerance;
 
 /// The answer of an estimator of N unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

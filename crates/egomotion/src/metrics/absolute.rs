@@ -8,7 +8,7 @@ use crate::geometry::RigidMotion;
 
 /// What may be changed of a trajectory before its positions are compared with the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Alignment {
+pub enum TrajectoryAlignment {
     /// Nothing.
     None,
     /// Where it begins and how it is turned.
@@ -17,7 +17,7 @@ pub enum Alignment {
     Sim3,
 }
 
-impl Alignment {
+impl TrajectoryAlignment {
     /// Its name in files and options.
     pub fn name(self) -> &'static str {
         match self {
@@ -49,8 +49,12 @@ impl Similarity {
 ///
 /// Where one list is longer its tail is ignored. `None` where the positions do not determine it: fewer than three, or
 /// all on a line.
-pub fn align(estimate: &[RigidMotion], truth: &[RigidMotion], alignment: Alignment) -> Option<Similarity> {
-    if alignment == Alignment::None {
+pub fn align(
+    estimate: &[RigidMotion],
+    truth: &[RigidMotion],
+    alignment: TrajectoryAlignment,
+) -> Option<Similarity> {
+    if alignment == TrajectoryAlignment::None {
         return Some(Similarity { scale: 1.0, motion: RigidMotion::identity() });
     }
     let n = estimate.len().min(truth.len());
@@ -75,7 +79,7 @@ pub fn align(estimate: &[RigidMotion], truth: &[RigidMotion], alignment: Alignme
     let sign = if u.determinant() * v_t.determinant() < 0.0 { -1.0 } else { 1.0 };
     let signs = Vector3::new(1.0, 1.0, sign);
     let rotation = u * Matrix3::from_diagonal(&signs) * v_t;
-    let scale = if alignment == Alignment::Sim3 { d.dot(&signs) / variance } else { 1.0 };
+    let scale = if alignment == TrajectoryAlignment::Sim3 { d.dot(&signs) / variance } else { 1.0 };
     Some(Similarity { scale, motion: RigidMotion { rotation, translation: to - rotation * from * scale } })
 }
 

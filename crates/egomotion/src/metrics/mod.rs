@@ -8,7 +8,7 @@ mod drift;
 mod relative;
 mod section_seven;
 
-pub use absolute::{Alignment, Similarity, absolute_errors_m, align};
+pub use absolute::{Similarity, TrajectoryAlignment, absolute_errors_m, align};
 pub use association::associate;
 pub use consistency::{Coverage, Nees};
 pub use drift::{Drift, KITTI_LENGTHS_M, KITTI_START_EVERY, kitti_drift};

@@ -43,7 +43,7 @@ impl TimeToImpact {
 /// The window, in metres around the left camera's axis, that the vehicle sweeps: what crosses it is an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
-pub struct VehicleWindow {
+pub struct Vehicle {
     /// Left edge (X, negative is left).
     pub left_m: f64,
     /// Right edge.
@@ -54,13 +54,13 @@ pub struct VehicleWindow {
     pub bottom_m: f64,
 }
 
-impl Default for VehicleWindow {
+impl Default for Vehicle {
     fn default() -> Self {
         Self { left_m: -0.5, right_m: 0.5, top_m: -0.5, bottom_m: 0.5 }
     }
 }
 
-impl VehicleWindow {
+impl Vehicle {
     /// Whether a point at P′ moving by V per second passes through the window when it reaches the camera's plane.
     #[inline(always)]
     pub fn is_crossed_by(&self, later: &Vector3<f64>, velocity: &Vector3<f64>, seconds: f64) -> bool {
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn only_what_crosses_the_window_counts() {
-        let window = VehicleWindow::default();
+        let window = Vehicle::default();
         let (ahead, velocity) = (Vector3::new(0.1, 0.0, 4.0), Vector3::new(0.0, 0.0, -2.0));
         assert!(window.is_crossed_by(&ahead, &velocity, 2.0));
         assert!(!window.is_crossed_by(&ahead, &Vector3::new(0.4, 0.0, -2.0), 2.0));

@@ -48,7 +48,7 @@ impl NoObstacle {
 
 /// What makes points an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Belief {
+pub struct ObstacleCriteria {
     /// Side of the cells that points are gathered in, in pixels.
     pub cell_px: usize,
     /// Least share of a cell's points that must cross: a mismatched patch does not fill a cell.
@@ -57,7 +57,7 @@ pub struct Belief {
     pub region_points: usize,
 }
 
-impl Belief {
+impl ObstacleCriteria {
     /// Every pixel is a point.
     pub const DENSE: Self = Self { cell_px: 16, cell_share: 0.25, region_points: 100 };
     /// Points are tracks, about thirty pixels apart.
@@ -116,7 +116,7 @@ fn agree(a: &TimeToImpact, b: &TimeToImpact) -> bool {
 pub fn nearest(
     seen: &mut [Sightings],
     image: (usize, usize),
-    belief: &Belief,
+    belief: &ObstacleCriteria,
 ) -> Result<Obstacle, NoObstacle> {
     let total = |count: fn(&Sightings) -> usize| seen.iter().map(count).sum::<usize>();
     if total(|cell| cell.seen) == 0 {
@@ -161,7 +161,7 @@ mod tests {
     use super::*;
     use crate::geometry::Gaussian;
 
-    const BELIEF: Belief = Belief { cell_px: 10, cell_share: 0.25, region_points: 20 };
+    const BELIEF: ObstacleCriteria = ObstacleCriteria { cell_px: 10, cell_share: 0.25, region_points: 20 };
     /// 4 × 3 cells.
     const IMAGE: (usize, usize) = (40, 30);
 
@@ -215,7 +215,7 @@ mod tests {
         // 9 of 40 are less than a quarter, whatever the number of such cells.
         let thin: Vec<_> = (0..12).map(|cell| (cell, 9, 0.5)).collect();
         assert_eq!(found(&thin), Err(NoObstacle::OnlyScattered));
-        let two_points = Belief { cell_share: 0.0, region_points: 0, ..BELIEF };
+        let two_points = ObstacleCriteria { cell_share: 0.0, region_points: 0, ..BELIEF };
         assert_eq!(nearest(&mut seen(&[(0, 2, 0.5)]), IMAGE, &two_points), Err(NoObstacle::OnlyScattered));
     }
 

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::dispatch::vectorised;
 use crate::geometry::{Grid, Image};
+use crate::simd::vectorised;
 
 /// Half the side of the window over which the structure tensor is summed, in pixels.
 const RADIUS: usize = 3;

@@ -3,7 +3,6 @@
 pub mod corners;
 mod depth_alignment;
 pub mod disparity;
-pub(crate) mod dispatch;
 pub mod flow;
 mod follow;
 pub mod observation;

@@ -6,9 +6,9 @@
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
-use super::dispatch::vectorised;
 use super::window::{self, LANES, SIDE, Window};
 use crate::geometry::Image;
+use crate::simd::vectorised;
 
 pub use super::window::RADIUS;
 

@@ -1,7 +1,7 @@
 //! Image pyramid and image gradients, computed once per frame and shared by flow and tracks.
 
-use super::dispatch::vectorised;
 use crate::geometry::{Grid, Image};
+use crate::simd::vectorised;
 use rayon::prelude::*;
 
 /// Levels of which the smaller side would be under this many pixels are not built.

@@ -2,10 +2,10 @@
 
 use rayon::prelude::*;
 
-use super::dispatch::vectorised;
 use super::pyramid::fill_rows;
 use super::spline;
 use crate::geometry::{Grid, Image, StereoRectification};
+use crate::simd::vectorised;
 use nalgebra::Vector2;
 
 /// Turns the raw images of a pair into rectified ones.

@@ -1,8 +1,8 @@
 //! The disparity of a corner without any prior: a search along its row at half resolution.
 
-use super::dispatch::vectorised;
 use super::stereo_pyramid::StereoPyramid;
 use crate::geometry::Image;
+use crate::simd::vectorised;
 
 /// Half the side of the compared windows, in pixels of half resolution.
 const RADIUS: usize = 4;

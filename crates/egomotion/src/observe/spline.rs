@@ -7,9 +7,9 @@
 
 use rayon::prelude::*;
 
-use super::dispatch::vectorised;
 use super::pyramid::fill_rows;
 use crate::geometry::{Grid, Image};
+use crate::simd::vectorised;
 
 /// The pole of the cubic B-spline's inverse filter, √3 − 2.
 const POLE: f32 = -0.267_949_2;

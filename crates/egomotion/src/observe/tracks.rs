@@ -298,3 +298,37 @@ impl StereoCorner {
         Gaussian { mean: Vector3::new(x, y, rig.disparity_from_shift(self.shift)), cov }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::Ordering;
+
+    use super::*;
+    use crate::simd::PLAIN;
+
+    #[test]
+    fn wide_and_plain_kernels_give_the_same_bits() {
+        let grey = |u: f64, v: f64| {
+            let wave = |a: f64, b: f64, c: f64| (a * u + b * v + c).sin() * (b * u - a * v).cos();
+            (120.0
+                + 30.0 * wave(0.31, 0.12, 0.0)
+                + 25.0 * wave(-0.13, 0.26, 1.0)
+                + 40.0 * wave(0.05, 0.07, 2.0)) as f32
+        };
+        let image = |shift: f64| Grid::from_fn(213, 151, |u, v| grey(u as f64 + shift, v as f64));
+        let rig = StereoRig::new(300.0, (99.5, 74.5), 0.1, (213, 151)).unwrap();
+        let all = || {
+            let before = StereoPyramid::new(&image(0.0), &image(9.3), 4);
+            let after = StereoPyramid::new(&image(0.7), &image(10.0), 4);
+            let tracks = stereo_tracks(&before, &after, &rig, Hints::default(), &TrackOptions::default());
+            (before.left, before.right_spline, tracks)
+        };
+        let wide = all();
+        PLAIN.store(true, Ordering::Relaxed);
+        let plain = all();
+        PLAIN.store(false, Ordering::Relaxed);
+        assert!(wide.2.len() > 100, "{}", wide.2.len());
+        assert!(wide.0 == plain.0 && wide.1 == plain.1);
+        assert_eq!(wide.2, plain.2);
+    }
+}

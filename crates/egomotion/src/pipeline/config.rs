@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::estimate::Tolerance;
-use crate::estimate::lmeds::LmedsOptions;
-use crate::estimate::m_estimator::StudentT;
-use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
-use crate::motion::impact::VehicleWindow;
+use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
+use crate::estimate::linear::lmeds::LmedsOptions;
+use crate::estimate::linear::m_estimator::StudentT;
+use crate::motion::impact::Vehicle;
 use crate::observe::disparity::AreaOptions;
 use crate::observe::flow::FlowError;
 use crate::observe::{DisparityOptions, FlowOptions, TrackOptions};
@@ -86,7 +86,7 @@ pub struct Config {
     /// How well the sensor is known, for method `ml`; all zero: a depth camera's is that of its kind, a stereo rig is exact.
     pub tolerance: Tolerance,
     /// What the vehicle sweeps.
-    pub window: VehicleWindow,
+    pub vehicle: Vehicle,
     /// Corners and their tracks.
     pub tracks: TrackOptions,
     /// Dense disparity.
@@ -112,7 +112,7 @@ impl Default for Config {
             block_px: 48.0,
             sample_step_px: 3,
             tolerance: Tolerance::default(),
-            window: VehicleWindow::default(),
+            vehicle: Vehicle::default(),
             tracks: TrackOptions::default(),
             disparity: DisparityOptions::default(),
             flow: FlowOptions::default(),
@@ -131,7 +131,7 @@ pub fn meaning(path: &[&str]) -> Option<&'static str> {
     match path {
         [name] => of::<Config>(name),
         ["tolerance", name] => of::<Tolerance>(name),
-        ["window", name] => of::<VehicleWindow>(name),
+        ["vehicle", name] => of::<Vehicle>(name),
         ["tracks", name] => of::<TrackOptions>(name),
         ["disparity", name] => of::<DisparityOptions>(name),
         ["disparity", "area", name] => of::<AreaOptions>(name),
@@ -236,8 +236,8 @@ impl Config {
             ),
             (self.tolerance.is_valid(), "tolerance: each must be finite and not negative"),
             (
-                self.window.left_m < self.window.right_m && self.window.top_m < self.window.bottom_m,
-                "window: left_m must be less than right_m, top_m less than bottom_m",
+                self.vehicle.left_m < self.vehicle.right_m && self.vehicle.top_m < self.vehicle.bottom_m,
+                "vehicle: left_m must be less than right_m, top_m less than bottom_m",
             ),
         ];
         rules.iter().find(|(ok, _)| !ok).map_or(Ok(()), |(_, rule)| Err(ConfigError::Range(rule)))

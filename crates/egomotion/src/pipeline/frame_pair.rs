@@ -11,11 +11,11 @@ use super::solve::{Observed, solve};
 use super::stereo::StageTimes;
 use super::track_solver::TrackSolver;
 use super::unanswered::Unanswered;
-use crate::estimate::tolerance::Sensor;
+use crate::estimate::sensor::tolerance::TrackSource;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Grid, StereoRig, Twist};
-use crate::motion::obstacle::{Belief, NoObstacle, Obstacle, nearest};
-use crate::observe::flow::{Camera, FlowPair, FlowSpace, rigid_flow};
+use crate::motion::obstacle::{NoObstacle, Obstacle, ObstacleCriteria, nearest};
+use crate::observe::flow::{FlowPair, FlowSpace, Side, rigid_flow};
 use crate::observe::row_disagreement::row_disagreement;
 use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};
 use crate::observe::{DensePair, DisparityMap, FlowField, FlowOptions, StereoPyramid, StereoTrack};
@@ -139,8 +139,8 @@ impl FramePair<'_> {
     }
 
     fn solver(&self) -> TrackSolver<'_> {
-        let by = if self.hints(None).given.is_some() { Sensor::Image } else { Sensor::Stereo };
-        TrackSolver { rig: self.rig, config: self.config, dt_s: self.dt_s(), by }
+        let source = if self.hints(None).given.is_some() { TrackSource::Image } else { TrackSource::Stereo };
+        TrackSolver { rig: self.rig, config: self.config, dt_s: self.dt_s(), source }
     }
 
     fn dense(
@@ -169,10 +169,10 @@ impl FramePair<'_> {
         let (flow, right) = timed(&mut stages.flow_ms, || {
             let left = match given {
                 Some(given) => Some(given.clone()),
-                None => self.flow(Camera::Left, before, prediction, space),
+                None => self.flow(Side::Left, before, prediction, space),
             };
             let both = both && self.before.images.has_right() && self.after.images.has_right();
-            let right = both.then(|| self.flow(Camera::Right, before, prediction, space));
+            let right = both.then(|| self.flow(Side::Right, before, prediction, space));
             (left, right.flatten())
         });
         let Some(flow) = flow else {
@@ -210,7 +210,7 @@ impl FramePair<'_> {
             // Without a motion nobody knows what will cross the window.
             let obstacle = rigid
                 .ok_or(NoObstacle::NothingMeasured)
-                .and_then(|_| nearest(&mut seen, pair.flow.size(), &Belief::DENSE));
+                .and_then(|_| nearest(&mut seen, pair.flow.size(), &ObstacleCriteria::DENSE));
             (maps, obstacle, groups.map_or_else(Vec::new, Groups::into_groups))
         });
         PairResult {
@@ -228,18 +228,18 @@ impl FramePair<'_> {
     /// one's is read between its pixels.
     fn flow(
         &self,
-        camera: Camera,
+        side: Side,
         before: &DisparityMap,
         phi: Option<&Twist>,
         space: &mut FlowSpace,
     ) -> Option<FlowField> {
         let (a, b) = (&self.before.images, &self.after.images);
-        let (from, to, spline) = match camera {
-            Camera::Left => (&a.left, &b.left, &b.left_spline),
-            Camera::Right => (&a.right, &b.right, &b.right_spline),
+        let (from, to, spline) = match side {
+            Side::Left => (&a.left, &b.left, &b.left_spline),
+            Side::Right => (&a.right, &b.right, &b.right_spline),
         };
-        let initial = phi.map(|phi| rigid_flow(before, self.rig, phi, camera));
-        let fill = self.config.flow.fill && camera == Camera::Left;
+        let initial = phi.map(|phi| rigid_flow(before, self.rig, phi, side));
+        let fill = self.config.flow.fill && side == Side::Left;
         let options = FlowOptions { fill, ..self.config.flow.clone() };
         FlowPair { from, to, to_spline: Some(spline) }.flow(initial.as_ref(), &options, space).ok()
     }

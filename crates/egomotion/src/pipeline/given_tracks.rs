@@ -11,7 +11,7 @@ use super::stereo::{FrameMotion, MOST_FAILURES, PipelineError, StageTimes};
 use super::track_solver::TrackSolver;
 use super::unanswered::Unanswered;
 use crate::estimate::median;
-use crate::estimate::tolerance::Sensor;
+use crate::estimate::sensor::tolerance::TrackSource;
 use crate::geometry::{Gaussian, StereoRig, Twist};
 use crate::observe::StereoTrack;
 
@@ -159,7 +159,7 @@ impl TrackMotion {
         let rows = Some(median(&mut rows).abs()).filter(|rows| rows.is_finite());
         let mut config = self.config.clone();
         config.maximum_likelihood.kernel.fitted &= tracks.len() >= FEWEST_FITTED;
-        let solver = TrackSolver { rig: &self.rig, config: &config, dt_s, by: Sensor::Stereo };
+        let solver = TrackSolver { rig: &self.rig, config: &config, dt_s, source: TrackSource::Stereo };
         let rough = solver.rough(&tracks, prior.as_ref());
         let result = solver.sparse(&tracks, rough, rows, &mut stages);
         let answer = FrameMotion {

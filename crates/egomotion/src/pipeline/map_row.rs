@@ -10,9 +10,9 @@ use super::groups::Groups;
 use crate::geometry::{Gaussian, StereoRig};
 use crate::motion::DepthVelocity;
 use crate::motion::depth_velocity::{self, RigidPrediction, contradict};
-use crate::motion::impact::{TimeToImpact, VehicleWindow};
+use crate::motion::impact::{TimeToImpact, Vehicle};
 use crate::observe::DensePair;
-use crate::observe::dispatch::vectorised;
+use crate::simd::vectorised;
 
 /// What the rows of a pair of frames share.
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +94,7 @@ impl MapRow {
         loomings(&self.velocity, dt_s, &mut self.looming, out);
         match rigid {
             Some(rigid) => {
-                let when = (&config.window, dt_s);
+                let when = (&config.vehicle, dt_s);
                 crossings(rigid, rays, when, &self.velocity[0], &self.looming[0], &mut self.crosses);
                 if let Some(groups) = scene.groups {
                     self.cross_alone(groups, rays, when, v);
@@ -148,7 +148,7 @@ impl MapRow {
     }
 
     /// Whether pixels that move by themselves cross the window: as their bodies move, and never where they make none.
-    fn cross_alone(&mut self, groups: &Groups<'_>, rays: Rays<'_>, when: (&VehicleWindow, f64), v: usize) {
+    fn cross_alone(&mut self, groups: &Groups<'_>, rays: Rays<'_>, when: (&Vehicle, f64), v: usize) {
         for u in 0..self.width() {
             let Some(body) = groups.body(u, v) else {
                 self.crosses[u] &= !groups.moving.is_moving(u, v);
@@ -283,7 +283,7 @@ vectorised! {
 crossings(
     rigid: &RigidPrediction<'_>,
     rays: Rays<'_>,
-    when: (&VehicleWindow, f64),
+    when: (&Vehicle, f64),
     z: &[f64],
     looming: &[f64],
     out: &mut [bool],

@@ -9,7 +9,7 @@ use super::map_row::{MapRow, Scene};
 use crate::geometry::{Cells, Field, Gaussian, Grid, StereoRig};
 use crate::motion::TimeToImpact;
 use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
-use crate::motion::obstacle::{Belief, Sightings};
+use crate::motion::obstacle::{ObstacleCriteria, Sightings};
 use crate::observe::{DensePair, StereoTrack};
 
 /// Per-pixel results on the pixel grid of the earlier frame; missing pixels are NaN.
@@ -42,7 +42,7 @@ impl MotionMaps {
 }
 
 /// VZ and time to impact of every pixel, and what was seen for the nearest obstacle in each cell of
-/// [`Belief::DENSE`].
+/// [`ObstacleCriteria::DENSE`].
 ///
 /// With `dcce` and `dv` VZ is that method's own measurement at each pixel; with the others it is
 /// the rigid scene's, except where flow or the measured change of disparity contradicts it: there it
@@ -55,7 +55,7 @@ pub fn motion_maps(
     dt_s: f64,
 ) -> (MotionMaps, Vec<Sightings>) {
     let (width, height) = pair.flow.size();
-    let cell_px = Belief::DENSE.cell_px;
+    let cell_px = ObstacleCriteria::DENSE.cell_px;
     let scene = Scene { pair, rigid, groups, config, dt_s };
     let mut planes: [Grid<f32>; 4] = std::array::from_fn(|_| Grid::filled(width, height, 0.0));
     let [vz, sigma, looming, looming_sigma] =
@@ -101,11 +101,11 @@ fn crosses(
     impact.seconds().is_some_and(|seconds| {
         let later = rigid.motion().apply(before);
         let velocity = (later - before) / dt_s;
-        config.window.is_crossed_by(&later, &velocity, seconds)
+        config.vehicle.is_crossed_by(&later, &velocity, seconds)
     })
 }
 
-/// What tracks show of the nearest obstacle, in each cell of [`Belief::SPARSE`].
+/// What tracks show of the nearest obstacle, in each cell of [`ObstacleCriteria::SPARSE`].
 pub fn track_sightings(
     tracks: &[StereoTrack],
     rigid: &RigidPrediction<'_>,
@@ -114,7 +114,7 @@ pub fn track_sightings(
     dt_s: f64,
 ) -> Vec<Sightings> {
     let (width, height) = (rig.width_px, rig.height_px);
-    let cells = Cells::over((width, height), Belief::SPARSE.cell_px);
+    let cells = Cells::over((width, height), ObstacleCriteria::SPARSE.cell_px);
     let mut seen = vec![Sightings::default(); cells.count()];
     // The conversion takes what is negative to zero.
     let pixel = |c: f64, n: usize| (c.round() as usize).min(n.saturating_sub(1));

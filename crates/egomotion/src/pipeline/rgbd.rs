@@ -78,16 +78,7 @@ impl DepthNoise {
             Tolerance { focal: 2e-3, centre_px: 1.0, scale: 5e-3, readout_s: 0.03, delay_s: 5e-3 };
         match self {
             Self::StructuredLight { .. } | Self::Stereo { .. } => hand_held,
-            Self::TimeOfFlight { .. } => {
-                let e = |n: &str, v: f64| std::env::var(n).map_or(v, |v| v.parse().unwrap());
-                Tolerance {
-                    focal: e("TF", 2e-3),
-                    centre_px: e("TC", 1.0),
-                    scale: e("TS", 2e-3),
-                    readout_s: e("TR", 0.03),
-                    delay_s: e("TD", 2e-3),
-                }
-            }
+            Self::TimeOfFlight { .. } => Tolerance { scale: 2e-3, delay_s: 2e-3, ..hand_held },
             Self::Exact { .. } => Tolerance::rendered(),
         }
     }

@@ -10,9 +10,9 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::config::Config;
 use super::solve::{SETTLED, Solver};
-use crate::estimate::m_estimator::StudentT;
-use crate::estimate::maximum_likelihood::MaximumLikelihoodOptions;
-use crate::estimate::tolerance::{Sensed, Sensor, SensorErrors};
+use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
+use crate::estimate::linear::m_estimator::StudentT;
+use crate::estimate::sensor::tolerance::{SensedTrack, SensorErrors, TrackSource};
 use crate::estimate::{MotionEstimate, Unsolvable, median};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::{DensePair, StereoTrack};
@@ -84,17 +84,18 @@ fn observations(
     errors: &SensorErrors,
     reach_px: f64,
     config: &Config,
-) -> Vec<Sensed> {
+) -> Vec<SensedTrack> {
     let (rig, motion, seen_by_depth) = (pair.rig, &phi.exp(), errors.apart.exp().after(&phi.exp()));
-    let corrected = |track: StereoTrack, by| errors.corrected(&Sensed { track, by }, rig);
+    let corrected = |track: StereoTrack, source| errors.corrected(&SensedTrack { track, source }, rig);
     let shapes = pair.every(config.sample_step_px, |pair, u, v| {
         let track = pair.shape_track(u, v, &seen_by_depth, reach_px)?;
-        Some((corrected(track, Sensor::Depth), pair.flow.get(u, v).is_some()))
+        Some((corrected(track, TrackSource::Depth), pair.flow.get(u, v).is_some()))
     });
     let squares = shapes.iter().filter_map(|(shape, _)| across_surface(&shape.track, rig, motion));
     let disparity = factor(squares.collect(), MEDIAN_1);
     let placed = |tracks: &[StereoTrack], overlap: f64| {
-        let mut tracks: Vec<Sensed> = tracks.iter().map(|&track| corrected(track, Sensor::Image)).collect();
+        let mut tracks: Vec<SensedTrack> =
+            tracks.iter().map(|&track| corrected(track, TrackSource::Image)).collect();
         let squares = tracks.iter().filter_map(|sensed| along_surface(&sensed.track, rig, motion));
         let place = factor(squares.collect(), MEDIAN_2) * overlap;
         tracks.iter_mut().for_each(|sensed| sensed.track = scaled(&sensed.track, place, disparity));
@@ -103,7 +104,9 @@ fn observations(
     let mut all = placed(&tracked.flow, overlap(config));
     all.extend(placed(tracked.corners, 1.0));
     let elsewhere = shapes.into_iter().filter(|(_, tracked)| !tracked);
-    all.extend(elsewhere.map(|(shape, _)| Sensed { track: scaled(&shape.track, 1.0, disparity), ..shape }));
+    all.extend(
+        elsewhere.map(|(shape, _)| SensedTrack { track: scaled(&shape.track, 1.0, disparity), ..shape }),
+    );
     all
 }
 

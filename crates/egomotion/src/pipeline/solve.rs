@@ -3,15 +3,15 @@
 use super::config::{Approach, Config, EstimatorKind, Method};
 use crate::constrain::{binocular_flow, dcce, image_flow};
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
-use crate::estimate::errors_in_variables::errors_in_variables;
-use crate::estimate::joint::joint_step;
-use crate::estimate::least_squares::{Weighting, least_squares};
-use crate::estimate::lmeds::{LmedsOptions, lmeds};
-use crate::estimate::m_estimator::m_estimate;
-use crate::estimate::maximum_likelihood::{MaximumLikelihood, maximum_likelihood};
+use crate::estimate::likelihood::maximum_likelihood::{MaximumLikelihood, maximum_likelihood};
+use crate::estimate::linear::errors_in_variables::errors_in_variables;
+use crate::estimate::linear::least_squares::{Weighting, least_squares};
+use crate::estimate::linear::lmeds::{LmedsOptions, lmeds};
+use crate::estimate::linear::m_estimator::m_estimate;
+use crate::estimate::linear::two_step::two_step;
 use crate::estimate::measurement::Measurement;
-use crate::estimate::tolerance::{Sensed, Sensor, SensorErrors, SensorPrior};
-use crate::estimate::two_step::two_step;
+use crate::estimate::sensor::augmented::augmented_step;
+use crate::estimate::sensor::tolerance::{SensedTrack, SensorErrors, SensorPrior, TrackSource};
 use crate::estimate::{Blocks, Fit, MotionEstimate, Row, Tolerance, Unsolvable};
 use crate::geometry::{StereoRig, Twist};
 use crate::observe::{DensePair, DepthChange, StereoFlow, StereoTrack};
@@ -21,7 +21,7 @@ use nalgebra::Matrix6;
 #[derive(Debug, Clone, Copy)]
 pub enum Observed<'a> {
     /// Tracked corners, and what saw them.
-    Sparse(&'a [StereoTrack], Sensor),
+    Sparse(&'a [StereoTrack], TrackSource),
     /// Dense fields, of which every `sample_step_px`-th pixel is used.
     Dense(DensePair<'a>, &'a [StereoTrack]),
 }
@@ -39,7 +39,7 @@ pub fn solve(
 ) -> Result<MotionEstimate, Unsolvable> {
     let solver = Solver::new(rig, start, config).over(dt_s);
     let found = match (config.method, config.approach) {
-        (Method::Ml, Approach::Discrete) => solver.sensed(&solver.tracks(observed), observed.by()),
+        (Method::Ml, Approach::Discrete) => solver.sensed(&solver.tracks(observed), observed.source()),
         (Method::Ml, Approach::Differential) => solver.likelihood(&solver.flows(observed)),
         (Method::Dcce, _) => solver.depth_change(&solver.depth_changes(observed)),
         (Method::Dv, _) => solver.binocular(&solver.flows(observed)),
@@ -52,11 +52,11 @@ pub fn solve(
 
 impl Observed<'_> {
     /// What made the tracks.
-    fn by(&self) -> Sensor {
+    fn source(&self) -> TrackSource {
         match self {
-            Observed::Sparse(_, by) => *by,
-            Observed::Dense(pair, _) if pair.given => Sensor::Image,
-            Observed::Dense(..) => Sensor::Stereo,
+            Observed::Sparse(_, source) => *source,
+            Observed::Dense(pair, _) if pair.given => TrackSource::Image,
+            Observed::Dense(..) => TrackSource::Stereo,
         }
     }
 }
@@ -163,15 +163,16 @@ impl<'a> Solver<'a> {
     }
 
     /// Maximum likelihood of tracks that a sensor made which is known only so well.
-    fn sensed(&self, tracks: &[StereoTrack], by: Sensor) -> Result<MotionEstimate, Unsolvable> {
+    fn sensed(&self, tracks: &[StereoTrack], source: TrackSource) -> Result<MotionEstimate, Unsolvable> {
         if self.prior.is_exact() {
             return self.likelihood(tracks);
         }
         let (mut errors, mut start) = (SensorErrors::none(), *self.start);
         let mut round = 0;
         loop {
-            let made = tracks.iter().map(|&track| Sensed { track, by });
-            let corrected: Vec<Sensed> = made.map(|sensed| errors.corrected(&sensed, self.rig)).collect();
+            let made = tracks.iter().map(|&track| SensedTrack { track, source });
+            let corrected: Vec<SensedTrack> =
+                made.map(|sensed| errors.corrected(&sensed, self.rig)).collect();
             let found = Solver { start: &start, ..*self }.round(&corrected, &mut errors)?;
             let moved = found.moved_from(&start);
             start = found.phi();
@@ -185,7 +186,7 @@ impl<'a> Solver<'a> {
     /// Maximum likelihood of observations from which `errors` are taken, and a step towards the most likely errors.
     pub(super) fn round(
         &self,
-        corrected: &[Sensed],
+        corrected: &[SensedTrack],
         errors: &mut SensorErrors,
     ) -> Result<MotionEstimate, Unsolvable> {
         let tracks: Vec<StereoTrack> = corrected.iter().map(|sensed| sensed.track).collect();
@@ -195,7 +196,7 @@ impl<'a> Solver<'a> {
         let (phase, mut motion) = (self.phase(&found), found.motion);
         let joint = match self.prior.is_exact() {
             true => None,
-            false => joint_step(corrected, self.rig, &found, errors, &self.prior, blocks),
+            false => augmented_step(corrected, self.rig, &found, errors, &self.prior, blocks),
         };
         if let Some(joint) = joint {
             motion.theta.mean += joint.step;

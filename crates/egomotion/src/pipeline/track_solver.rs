@@ -7,14 +7,14 @@ use super::maps::track_sightings;
 use super::solve::{Observed, solve};
 use super::stereo::StageTimes;
 use super::unanswered::Unanswered;
-use crate::estimate::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
-use crate::estimate::robust_start::robust_start;
-use crate::estimate::systematic::common_errors;
-use crate::estimate::tolerance::Sensor;
+use crate::estimate::likelihood::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
+use crate::estimate::likelihood::robust_start::robust_start;
+use crate::estimate::sensor::systematic::common_errors;
+use crate::estimate::sensor::tolerance::TrackSource;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{StereoRig, Twist};
 use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
-use crate::motion::obstacle::{Belief, NoObstacle, nearest};
+use crate::motion::obstacle::{NoObstacle, ObstacleCriteria, nearest};
 use crate::observe::StereoTrack;
 
 /// Standard deviation of an offset of disparity per pixel by which rows disagree.
@@ -31,7 +31,7 @@ pub(super) struct TrackSolver<'a> {
     pub(super) config: &'a Config,
     pub(super) dt_s: f64,
     /// What makes the tracks.
-    pub(super) by: Sensor,
+    pub(super) source: TrackSource,
 }
 
 impl<'a> TrackSolver<'a> {
@@ -61,12 +61,12 @@ impl<'a> TrackSolver<'a> {
         stages: &mut StageTimes,
     ) -> PairResult {
         let motion = timed(&mut stages.estimate_ms, || {
-            solve(&Observed::Sparse(tracks, self.by), self.rig, &rough?, self.config, self.dt_s)
+            solve(&Observed::Sparse(tracks, self.source), self.rig, &rough?, self.config, self.dt_s)
         });
         let rigid = self.rigid(tracks, motion.as_ref().ok(), row_disagreement_px);
         let obstacle = rigid.ok_or(NoObstacle::NothingMeasured).and_then(|rigid| {
             let mut seen = track_sightings(tracks, &rigid, self.rig, self.config, self.dt_s);
-            nearest(&mut seen, (self.rig.width_px, self.rig.height_px), &Belief::SPARSE)
+            nearest(&mut seen, (self.rig.width_px, self.rig.height_px), &ObstacleCriteria::SPARSE)
         });
         PairResult {
             motion: motion.map_err(Unanswered::from),

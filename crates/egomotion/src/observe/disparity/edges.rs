@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::DisparityMap;
-use crate::observe::dispatch::vectorised;
+use crate::simd::vectorised;
 
 /// How far edges are misplaced, in pixels.
 const REACH: usize = 2;

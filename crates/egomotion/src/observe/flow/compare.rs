@@ -1,8 +1,8 @@
 //! Two images of one level compared at a displacement of each pixel, row by row.
 
 use crate::geometry::Image;
-use crate::observe::dispatch::vectorised;
 use crate::observe::spline;
+use crate::simd::vectorised;
 
 /// Pixels handled at a time.
 pub(super) const TILE: usize = 64;

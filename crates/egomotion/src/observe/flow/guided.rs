@@ -13,9 +13,9 @@ use super::search::PATCH;
 use super::solve::Solved;
 use super::{FlowField, FlowOptions, FlowPair, FlowSpace};
 use crate::geometry::{Grid, upper_median};
-use crate::observe::dispatch::vectorised;
 use crate::observe::planes::Planes;
 use crate::observe::spline;
+use crate::simd::vectorised;
 use rayon::prelude::*;
 
 /// Standard deviation by which the prediction damps the steps from it, in pixels of the level.

@@ -6,8 +6,8 @@ use super::refine::refine;
 use super::solve::Solved;
 use super::widen::widened;
 use super::{FlowField, FlowOptions, GUESS_SIGMA_PX};
-use crate::observe::dispatch::vectorised;
 use crate::observe::planes::Planes;
+use crate::simd::vectorised;
 
 /// Flow at full resolution, from the prediction and its correction at a coarse `level`.
 pub(super) fn measured(

@@ -27,7 +27,7 @@ mod variance_factor;
 mod widen;
 
 pub use options::FlowOptions;
-pub use rigid::{Camera, rigid_flow};
+pub use rigid::{Side, rigid_flow};
 
 use crate::geometry::{Field, Gaussian, Grid, Image};
 use crate::observe::planes::Planes;
@@ -228,7 +228,7 @@ mod tests {
     use std::sync::atomic::Ordering;
 
     use super::*;
-    use crate::observe::dispatch::tests::PLAIN;
+    use crate::simd::PLAIN;
 
     #[test]
     fn the_answer_depends_not_on_the_vectors() {

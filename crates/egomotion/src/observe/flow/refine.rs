@@ -4,8 +4,8 @@ use super::FlowOptions;
 use super::compare::{Differences, Images, TILE};
 use super::solve::{Settings, Solved, solve};
 use super::variance_factor::variance_factor;
-use crate::observe::dispatch::vectorised;
 use crate::observe::planes::Planes;
+use crate::simd::vectorised;
 use rayon::prelude::*;
 
 /// Rows that are made at a time; fixed, so that the answer does not depend on the threads.

@@ -7,8 +7,8 @@
 use super::FlowField;
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::disparity::{DisparityMap, GUESS_SIGMA_PX};
-use crate::observe::dispatch::vectorised;
 use crate::observe::planes::Planes;
+use crate::simd::vectorised;
 use rayon::prelude::*;
 
 /// Standard deviation of the prediction for what disparity does not tell (the motion's own error), in pixels.
@@ -16,7 +16,7 @@ const MOTION_SIGMA_PX: f32 = 0.1;
 
 /// Which camera's flow is predicted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Camera {
+pub enum Side {
     /// The left one, which disparity belongs to.
     Left,
     /// The right one.
@@ -28,7 +28,7 @@ pub enum Camera {
 ///
 /// Where disparity is missing it is bridged along the row, and rows without any take the nearest row's;
 /// such values are guesses, and so is their covariance. Pixels that end up behind the camera are missing.
-pub fn rigid_flow(disparity: &DisparityMap, rig: &StereoRig, phi: &Twist, camera: Camera) -> FlowField {
+pub fn rigid_flow(disparity: &DisparityMap, rig: &StereoRig, phi: &Twist, side: Side) -> FlowField {
     let (width, height) = disparity.shift.size();
     let motion = phi.exp();
     let rows = nearest_rows(disparity);
@@ -40,15 +40,15 @@ pub fn rigid_flow(disparity: &DisparityMap, rig: &StereoRig, phi: &Twist, camera
                 let v = strip * ROWS + k;
                 let Some(&Some(source)) = rows.get(v) else { continue };
                 let (from_shift, from_sigma) = (disparity.shift.row(source), disparity.sigma.row(source));
-                match camera {
-                    Camera::Left => {
+                match side {
+                    Side::Left => {
                         shift.copy_from_slice(from_shift);
                         sigma.copy_from_slice(from_sigma);
                     }
-                    Camera::Right => seen_from_right(from_shift, from_sigma, shift, sigma),
+                    Side::Right => seen_from_right(from_shift, from_sigma, shift, sigma),
                 }
-                bridge(shift, sigma, camera);
-                let terms = Terms::new(rig, &motion, v, camera);
+                bridge(shift, sigma, side);
+                let terms = Terms::new(rig, &motion, v, side);
                 predict(&terms, shift, sigma, out.each_mut().map(|p| &mut p[k * width..(k + 1) * width]));
             }
         },
@@ -90,7 +90,7 @@ fn seen_from_right(shift: &[f32], sigma: &[f32], to_shift: &mut [f32], to_sigma:
 
 /// Fill the gaps of a row from their ends: linearly in the left camera; in the right one with the farther
 /// end, for there a gap is what the left camera does not see.
-fn bridge(shift: &mut [f32], sigma: &mut [f32], camera: Camera) {
+fn bridge(shift: &mut [f32], sigma: &mut [f32], side: Side) {
     let mut last: Option<usize> = None;
     for u in 0..=shift.len() {
         if shift.get(u).is_some_and(|d| d.is_nan()) {
@@ -100,7 +100,7 @@ fn bridge(shift: &mut [f32], sigma: &mut [f32], camera: Camera) {
         if !gap.is_empty() {
             let before = last.map(|l| shift[l]);
             let (a, b) = match (before, shift.get(u).copied()) {
-                (Some(a), Some(b)) if camera == Camera::Left => (a, b),
+                (Some(a), Some(b)) if side == Side::Left => (a, b),
                 (Some(a), Some(b)) => (a.min(b), a.min(b)),
                 (Some(a), None) | (None, Some(a)) => (a, a),
                 (None, None) => return,
@@ -132,7 +132,7 @@ struct Terms {
 }
 
 impl Terms {
-    fn new(rig: &StereoRig, motion: &RigidMotion, v: usize, camera: Camera) -> Self {
+    fn new(rig: &StereoRig, motion: &RigidMotion, v: usize, side: Side) -> Self {
         let (x, y) = rig.image_from_pixel(0.0, v as f64);
         let r = &motion.rotation;
         Self {
@@ -144,7 +144,7 @@ impl Terms {
             y: y as f32,
             aspect: rig.aspect() as f32,
             doffs: rig.doffs_px as f32,
-            right: if camera == Camera::Right { 1.0 } else { 0.0 },
+            right: if side == Side::Right { 1.0 } else { 0.0 },
         }
     }
 }
@@ -199,8 +199,8 @@ mod tests {
             sigma: Field::from_grid(Grid::filled(64, 48, 0.0)),
             shift: Field::from_grid(shift),
         };
-        for camera in [Camera::Left, Camera::Right] {
-            let flow = rigid_flow(&map, &rig, &phi, camera);
+        for side in [Side::Left, Side::Right] {
+            let flow = rigid_flow(&map, &rig, &phi, side);
             for (u, v) in [(10, 3), (40, 20), (50, 47)] {
                 let s = f64::from(map.shift.get(u, v).unwrap());
                 let (x, y) = rig.image_from_pixel(u as f64, v as f64);
@@ -208,7 +208,7 @@ mod tests {
                 let after = rig.project(&phi.exp().apply(&rig.point(&before).unwrap())).unwrap();
                 let (mut u1, v1) = rig.pixel_from_image(after.x, after.y);
                 let mut from = u as f64;
-                if camera == Camera::Right {
+                if side == Side::Right {
                     from -= s;
                     u1 -= rig.shift_from_disparity(after.z);
                 }
@@ -222,17 +222,17 @@ mod tests {
     #[test]
     fn gaps_are_bridged_and_say_so() {
         let nan = f32::NAN;
-        for (camera, expected) in
-            [(Camera::Left, [2.0, 2.0, 3.0, 4.0, 5.0, 5.0]), (Camera::Right, [2.0, 2.0, 2.0, 2.0, 5.0, 5.0])]
+        for (side, expected) in
+            [(Side::Left, [2.0, 2.0, 3.0, 4.0, 5.0, 5.0]), (Side::Right, [2.0, 2.0, 2.0, 2.0, 5.0, 5.0])]
         {
             let mut shift = [nan, 2.0, nan, nan, 5.0, nan];
             let mut sigma = shift.map(|d: f32| if d.is_nan() { nan } else { 0.1 });
-            bridge(&mut shift, &mut sigma, camera);
+            bridge(&mut shift, &mut sigma, side);
             assert_eq!(shift, expected);
             assert!(sigma[0] >= 1.0 && sigma[1] == 0.1 && sigma[2] >= 1.0 && sigma[5] >= 1.0);
         }
         let mut none = [nan; 3];
-        bridge(&mut none, &mut [nan; 3], Camera::Left);
+        bridge(&mut none, &mut [nan; 3], Side::Left);
         assert!(none.iter().all(|d| d.is_nan()));
     }
 }

@@ -6,8 +6,8 @@
 use super::sampling::interpolate;
 use super::{Displacement, FlowField, FlowOptions};
 use crate::geometry::{Grid, Image};
-use crate::observe::dispatch::vectorised;
 use crate::observe::pyramid::{Gradients, gradients};
+use crate::simd::vectorised;
 use rayon::prelude::*;
 
 /// Side of a patch, in pixels.

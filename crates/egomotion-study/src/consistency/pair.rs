@@ -1,0 +1,130 @@
+//! One pair of frames at a random pose, through the pipeline, against the truth.
+
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use super::depth::Camera;
+use super::{BySigma, Record, RenderedSensor};
+use egomotion::geometry::{RigidMotion, Twist};
+use egomotion::pipeline::stereo::{DenseResults, PipelineError};
+use egomotion::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion};
+use egomotion::sim::{Scene, SensorNoise, Sequence, View};
+
+/// How far a pose may lie from the sequence's own, in metres and degrees along and about each axis.
+const REACH: (f64, f64) = (0.2, 6.0);
+/// Least distance to a surface, in metres: a pose that comes nearer is drawn again.
+const LEAST_CLEARANCE_M: f64 = 0.5;
+/// Poses that are tried before the sequence's own is taken.
+const TRIES: usize = 50;
+/// Rays through a pixel at an edge between surfaces, in each direction.
+const RAYS: usize = 3;
+
+/// A pair of frames with a pose, a texture and a noise of its own.
+pub(super) struct Pair<'a> {
+    sequence: &'a Sequence,
+    scene: Scene,
+    number: usize,
+    seed: u64,
+    phi: Twist,
+    poses: [RigidMotion; 2],
+}
+
+impl<'a> Pair<'a> {
+    /// The pair of that number; everything random in it follows from the number and the seed.
+    pub(super) fn new(sequence: &'a Sequence, number: usize, seed: u64) -> Self {
+        let name = sequence.name.bytes().fold(0_u64, |h, b| h.wrapping_mul(131).wrapping_add(b.into()));
+        let seed = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+            ^ name.wrapping_mul(1_000_003).wrapping_add(number as u64);
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
+        let scene = sequence.scene.clone().with_texture(rng.random());
+        let phi = sequence.phi_cyclopean(0).unwrap_or_else(Twist::zero);
+        let moved = |pose: RigidMotion| [pose, pose.after(&phi.exp().inverse())];
+        let clear = |poses: &[RigidMotion; 2]| {
+            poses.iter().all(|pose| scene.clearance_m(&pose.translation) > LEAST_CLEARANCE_M)
+        };
+        let mut any = || {
+            let mut within = |reach: f64| Vector3::from_fn(|_, _| rng.random_range(-reach..=reach));
+            Twist { t: within(REACH.0), omega: within(REACH.1.to_radians()) }
+        };
+        let poses = (0..TRIES).map(|_| moved(any().exp())).find(clear);
+        let poses = poses.unwrap_or_else(|| moved(RigidMotion::identity()));
+        // Files that hold a scene take no larger seed of noise.
+        Self { sequence, scene, number, seed: seed >> 1, phi, poses }
+    }
+
+    fn view(&self, k: usize) -> View<'_> {
+        View::new(&self.scene, &self.sequence.rig, self.poses[k])
+    }
+
+    /// What stereo says of it.
+    fn by_stereo(&self, observe: Observe) -> Result<FrameMotion, PipelineError> {
+        let config = Config { observe, ..Config::default() };
+        let mut motion = StereoMotion::new(self.sequence.rig, config)?;
+        motion.push(self.frame(0));
+        Ok(motion.push(self.frame(1)))
+    }
+
+    fn frame(&self, k: usize) -> StereoFrame {
+        let noise = SensorNoise::default().with_seed(self.seed);
+        let seen = noise.expose(&self.view(k).render(RAYS), k as u64);
+        StereoFrame { time_s: self.sequence.interval_s * k as f64, left: seen.left, right: seen.right }
+    }
+
+    /// Run the pipeline, and compare.
+    pub(super) fn judge(&self, sensor: RenderedSensor, observe: Observe) -> Result<Record, PipelineError> {
+        let rig = self.sequence.rig;
+        let answer = match sensor {
+            RenderedSensor::Stereo => self.by_stereo(observe)?,
+            RenderedSensor::Depth(kind) => {
+                Camera::new(kind, &self.scene, &rig, self.seed).answer(self.poses[0], &self.phi, observe)?
+            }
+        };
+        let phi = self.phi.seen_from(&rig.left_from_cyclopean());
+        let mut record = Record {
+            sequence: self.sequence.name.clone(),
+            pair: self.number,
+            error: None,
+            cov: Vec::new(),
+            depth_velocity: BySigma::default(),
+            looming: BySigma::default(),
+            answered: 0.0,
+        };
+        if let Some(found) = answer.motion.ok().filter(|found| found.is_complete()) {
+            record.error = Some((found.theta.mean - phi.vector()).into());
+            record.cov = found.theta.cov.iter().copied().collect();
+        }
+        if let Some(dense) = &answer.dense {
+            let interval_s = answer.dt_s.unwrap_or(self.sequence.interval_s);
+            self.judge_pixels(&mut record, dense, &phi, interval_s);
+        }
+        Ok(record)
+    }
+
+    fn judge_pixels(&self, record: &mut Record, dense: &DenseResults, phi: &Twist, interval_s: f64) {
+        let rig = &self.sequence.rig;
+        let truth = self.view(0).truth_maps(Some(phi));
+        let maps = &dense.motion;
+        let (mut answers, mut pixels) = (0, 0);
+        for v in 0..rig.height_px {
+            for u in 0..rig.width_px {
+                let (Some(z), Some(vz)) = (truth.depth.get(u, v), truth.depth_velocity.get(u, v)) else {
+                    continue;
+                };
+                pixels += 1;
+                let (Some(found), Some(sigma)) =
+                    (maps.depth_velocity.get(u, v), maps.depth_velocity_sigma.get(u, v))
+                else {
+                    continue;
+                };
+                answers += 1;
+                record.depth_velocity.add(f64::from(found - vz), sigma.into());
+                if let Some(impact) = maps.impact(u, v) {
+                    let looming = f64::from(-vz / (z + vz)) / interval_s;
+                    record.looming.add(impact.looming.value() - looming, impact.looming.sigma(0));
+                }
+            }
+        }
+        record.answered = f64::from(answers) / f64::from(pixels.max(1));
+    }
+}

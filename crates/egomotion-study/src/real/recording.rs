@@ -1,0 +1,102 @@
+//! The same comparison on a real recording whose camera poses are known.
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::lab::RealError;
+use super::measured::Measured;
+use super::record::{Draw, Record};
+use super::way::{Quantity, Way};
+use super::{depth_velocity, estimates, publish};
+use crate::Publication;
+use egomotion::geometry::{Field, RigidMotion, StereoRig, Twist};
+use egomotion::pipeline::Approach;
+use egomotion::sim::StereoImages;
+
+/// Three stereo frames of a recording, one interval apart, with the true motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Triple {
+    /// The pairs at t−1, t, t+1, of the rig's size.
+    pub frames: [StereoImages; 3],
+    /// True scene motion of the left camera, per interval, from t−1 to t and from t to t+1.
+    pub motion: [Twist; 2],
+    /// Name of the recording and index of the frame at t.
+    pub draw: Draw,
+}
+
+/// How the frames of a recording are measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Measuring {
+    /// ROUND: steps of disparity in a pixel.
+    pub levels: u32,
+    /// φ is estimated from every n-th pixel in both directions.
+    pub sample_step_px: usize,
+    /// Seed of random choices.
+    pub seed: u64,
+}
+
+impl Triple {
+    /// True φ: at t for the differential approach (half of that between t−1 and t+1), over t to t+1 for the discrete.
+    fn truth(&self, approach: Approach) -> Twist {
+        let [before, after] = &self.motion;
+        match approach {
+            Approach::Differential => after.exp().after(&before.exp()).log().scaled(0.5),
+            Approach::Discrete => *after,
+        }
+    }
+
+    /// φ of the left camera by every method against the truth, and VZ of every pixel against what the true φ does to
+    /// a still scene of the measured depth: what moves by itself counts as an error of all methods alike.
+    ///
+    /// # Errors
+    /// [`RealError`] when the images differ in size or the rig cannot measure.
+    pub fn records(&self, rig: &StereoRig, how: &Measuring) -> Result<Vec<Record>, RealError> {
+        let [_, now, after] = &self.frames;
+        let (found, expected) = (now.left.size(), (rig.width_px, rig.height_px));
+        if found != expected {
+            return Err(RealError::Size { found, expected });
+        }
+        let measured = Measured::new(&self.frames, rig, how.levels as f32)?;
+        let best = estimates::best(now, after, rig)?;
+        let mut ways = estimates::printed_ways(&measured, how.sample_step_px, how.seed);
+        ways.extend(best.motion.as_ref().ok().map(|estimate| (Way::BEST, *estimate)));
+        let phi = |(way, estimate): &(Way, _)| self.draw.phi(*way, estimate, &self.truth(way.approach));
+        let mut records: Vec<Record> = ways.iter().flat_map(phi).collect();
+        let still = [Approach::Differential, Approach::Discrete].map(|a| self.still_vz_mm(&measured, a));
+        for (way, map) in depth_velocity::maps(&measured, &best) {
+            let truth = &still[usize::from(way.approach == Approach::Discrete)];
+            let found = map.grid().values().iter().zip(truth.grid().values());
+            let pairs: Vec<(f64, f64)> = found.map(|(&e, &t)| (1e3 * f64::from(e), f64::from(t))).collect();
+            records.extend(self.draw.record(Some(way), Quantity::VzStill, &pairs));
+        }
+        Ok(records)
+    }
+
+    /// VZ of a still scene under the true φ, in mm per interval, where depth was measured.
+    fn still_vz_mm(&self, measured: &Measured, approach: Approach) -> Field {
+        let rig = &measured.rig;
+        let phi = self.truth(approach);
+        let motion: RigidMotion = phi.exp();
+        let shift = &measured.disparity[1].shift;
+        let mut vz = Field::missing(shift.width(), shift.height());
+        for v in 0..shift.height() {
+            for u in 0..shift.width() {
+                let Some(shift) = shift.get(u, v) else { continue };
+                let (x, y) = rig.image_from_pixel(u as f64, v as f64);
+                let d = rig.disparity_from_shift(shift.into());
+                let Some(point) = rig.point(&Vector3::new(x, y, d)) else { continue };
+                let rate = match approach {
+                    Approach::Differential => phi.velocity(&point).z,
+                    Approach::Discrete => motion.apply(&point).z - point.z,
+                };
+                vz.set(u, v, Some(1e3 * rate as f32));
+            }
+        }
+        vz
+    }
+}
+
+/// Tables and figures of a recording's records.
+pub fn publish(name: &str, records: &[Record]) -> Publication {
+    publish::recording(name, records)
+}

@@ -1,0 +1,240 @@
+//! Figures 7, 8 and 9 in the paper's arrangement, and two of our own: estimators, and number of features.
+
+use super::{Baseline, Record, Sweep, value_name};
+use crate::figure::Layout;
+use crate::{Axis, Content, Figure, Line, Panel, Point, Series};
+
+/// Errors below this, in percent, millimetres or degrees, are drawn here: exact answers leave rounding errors only.
+const LEAST_DRAWN: f64 = 1e-4;
+
+/// Who draws one line: approach, method, estimator.
+type Who = (&'static str, &'static str, &'static str);
+
+/// The paper's four methods.
+const PAPER: [(&str, Who); 4] = [
+    ("DCCE DIFF", ("differential", "dcce", "ls")),
+    ("DV DIFF", ("differential", "dv", "ls")),
+    ("DCCE DISC", ("discrete", "dcce", "ls")),
+    ("DV DISC", ("discrete", "dv", "ls")),
+];
+/// What stands beside them in figures of φ.
+const BESIDE: [(&str, Who); 4] = [
+    ("(22) DISC", ("discrete", "linear22", "ls")),
+    ("ML DIFF", ("differential", "ml", "ml")),
+    ("ML DISC", ("discrete", "ml", "ml")),
+    ("bound DISC", ("discrete", "bound", "bound")),
+];
+/// The sweeps of Figures 7 to 9: heading, and the sweep that bears on each approach.
+const SWEEPS: [(&str, [Sweep; 2]); 4] = [
+    ("amplitude of velocity", [Sweep::Step, Sweep::Step]),
+    ("disparity resolution", [Sweep::Round, Sweep::Round]),
+    ("noise in disparity", [Sweep::StdDisp, Sweep::StdDisp]),
+    ("noise in velocity", [Sweep::StdVel, Sweep::StdTrack]),
+];
+
+/// All figures that the records have something for.
+pub(super) fn figures(sequences: &[String], records: &[Record]) -> Vec<Figure> {
+    let mut figures = Vec::new();
+    // The paper shows C.
+    let ordered = sequences.iter().filter(|s| *s == "C").chain(sequences.iter().filter(|s| *s != "C"));
+    for sequence in ordered {
+        for baseline in [Baseline::Real, Baseline::Clean] {
+            let plot = Plots { records, sequence, baseline };
+            figures.extend([plot.figure_7(), plot.figure_8(), plot.figure_9()]);
+        }
+        let plot = Plots { records, sequence, baseline: Baseline::Real };
+        figures.extend([plot.estimators(), plot.features()]);
+    }
+    figures.retain(|figure| figure.panels.iter().any(has_a_line));
+    figures
+}
+
+fn has_a_line(panel: &Panel) -> bool {
+    matches!(&panel.content, Content::Plot { series, .. } if !series.is_empty())
+}
+
+struct Plots<'a> {
+    records: &'a [Record],
+    sequence: &'a str,
+    baseline: Baseline,
+}
+
+impl Plots<'_> {
+    fn figure_7(&self) -> Figure {
+        let panels = SWEEPS.iter().zip('a'..).map(|((name, sweeps), letter)| {
+            let mut lines: Vec<(&str, &str, Who)> =
+                PAPER.iter().map(|(name, who)| (*name, "vz", *who)).collect();
+            lines.extend([
+                ("ML DIFF, via φ", "vz_phi", ("differential", "ml", "ml")),
+                ("ML DISC, via φ", "vz_phi", ("discrete", "ml", "ml")),
+            ]);
+            self.panel(&format!("({letter}) {name}"), "VZ", *sweeps, &lines)
+        });
+        let about = "error of VZ of each pixel";
+        self.figure("07", about, 2, panels.collect())
+    }
+
+    fn figure_8(&self) -> Figure {
+        self.figure("08", "error of tZ, ΩX and ΩY: velocity and resolution", 3, self.phi_panels(0))
+    }
+
+    fn figure_9(&self) -> Figure {
+        self.figure("09", "error of tZ, ΩX and ΩY: noise", 3, self.phi_panels(2))
+    }
+
+    fn figure(&self, number: &str, about: &str, columns: usize, panels: Vec<Panel>) -> Figure {
+        let (sequence, baseline) = (self.sequence, self.baseline.name());
+        let paper = if sequence == "C" {
+            format!("Figure {}", number.trim_start_matches('0'))
+        } else {
+            format!("As Figure {}", number.trim_start_matches('0'))
+        };
+        let held = match self.baseline {
+            Baseline::Clean => "What is not swept is held at STEP 1, no rounding, no noise.",
+            Baseline::Real => "What is not swept is held at STEP 1, 1/16 px of disparity, 1/8 px of noise.",
+        };
+        Figure {
+            id: format!("figure-{number}-{sequence}-{baseline}"),
+            title: format!("{paper}. Sequence {sequence}, baseline {baseline}: {about}"),
+            caption: format!(
+                "{held} Least squares; bars are ± 2 standard errors over the draws. Errors below {LEAST_DRAWN} are drawn there."
+            ),
+            columns,
+            panels,
+        }
+    }
+
+    /// tZ, ΩX and ΩY against two of [`SWEEPS`].
+    fn phi_panels(&self, first: usize) -> Vec<Panel> {
+        let quantities = [("tZ", "tz"), ("ΩX", "wx"), ("ΩY", "wy")];
+        let of_sweep = SWEEPS[first..first + 2].iter().flat_map(|(name, sweeps)| {
+            quantities.iter().map(move |(heading, quantity)| (name, sweeps, heading, *quantity))
+        });
+        of_sweep
+            .zip('a'..)
+            .map(|((name, sweeps, heading, quantity), letter)| {
+                let lines: Vec<_> =
+                    PAPER.iter().chain(&BESIDE).map(|(name, who)| (*name, quantity, *who)).collect();
+                self.panel(&format!("({letter}) {heading}, {name}"), heading, *sweeps, &lines)
+            })
+            .collect()
+    }
+
+    /// tZ by every estimator of a method, against the resolution of disparity.
+    fn estimators(&self) -> Figure {
+        let methods = [
+            ("DCCE DIFF", "differential", "dcce"),
+            ("DV DIFF", "differential", "dv"),
+            ("joint DIFF", "differential", "joint"),
+            ("DCCE DISC", "discrete", "dcce"),
+            ("DV DISC", "discrete", "dv"),
+            ("joint DISC", "discrete", "joint"),
+            ("(22) DISC", "discrete", "linear22"),
+            ("rigid DISC", "discrete", "rigid"),
+        ];
+        let panels = methods.iter().zip('a'..).map(|((heading, approach, method), letter)| {
+            let lines: Vec<(&str, &str, Who)> = vec![
+                ("LS", "tz", (approach, method, "ls")),
+                ("LMedS", "tz", (approach, method, "lmeds")),
+                ("IRLS", "tz", (approach, method, "irls")),
+                ("ML", "tz", (approach, "ml", "ml")),
+                ("bound", "tz", (approach, "bound", "bound")),
+            ];
+            self.panel(&format!("({letter}) {heading}"), "tZ", [Sweep::Round; 2], &lines)
+        });
+        let panels: Vec<Panel> = panels.collect();
+        Figure {
+            id: format!("estimators-{}", self.sequence),
+            title: format!("Sequence {}: error of tZ by method and estimator", self.sequence),
+            caption: "Against the resolution of disparity, baseline real: least squares, least median of \
+                      squares, Student's t with rows weighted by their variance, maximum likelihood, and the \
+                      Cramér–Rao bound."
+                .to_owned(),
+            columns: 3,
+            panels,
+        }
+    }
+
+    fn features(&self) -> Figure {
+        let quantities = [("VZ via φ", "vz_phi"), ("tZ", "tz"), ("ΩX", "wx"), ("ΩY", "wy")];
+        let panels = quantities.iter().zip('a'..).map(|((heading, quantity), letter)| {
+            let all = PAPER.iter().chain(&BESIDE).filter(|(_, who)| who.0 == "discrete");
+            let lines: Vec<_> = all.map(|(name, who)| (*name, *quantity, *who)).collect();
+            self.panel(&format!("({letter}) {heading}"), heading, [Sweep::Features; 2], &lines)
+        });
+        let panels: Vec<Panel> = panels.collect();
+        Figure {
+            id: format!("features-{}", self.sequence),
+            title: format!("Sequence {}: error against the number of features", self.sequence),
+            caption:
+                "Baseline real, discrete approach, least squares. An error that does not fall with more \
+                      features is bias."
+                    .to_owned(),
+            columns: 2,
+            panels,
+        }
+    }
+
+    fn panel(&self, title: &str, quantity: &str, sweeps: [Sweep; 2], lines: &[(&str, &str, Who)]) -> Panel {
+        let relative = |(_, quantity, _): &(&str, &str, Who)| {
+            self.records.iter().find(|r| r.score.quantity == *quantity && r.sequence == self.sequence)
+        };
+        let figures = lines.iter().find_map(relative).and_then(|r| r.score.tally.figures());
+        let error = match (figures.is_none_or(|f| f.erm_abs.is_some()), quantity.starts_with('Ω')) {
+            (true, _) => "ERM (%)",
+            (false, true) => "EAM (°)",
+            (false, false) => "EAM (mm)",
+        };
+        let series = lines.iter().filter_map(|(name, quantity, who)| {
+            let points = self.points(sweeps[usize::from(who.0 == "discrete")], quantity, *who);
+            let line = match who {
+                (_, "bound", _) => Line::Reference,
+                ("discrete", ..) => Line::Dashed,
+                _ => Line::Solid,
+            };
+            (!points.is_empty()).then(|| Series { name: (*name).to_owned(), line, points })
+        });
+        let content = Content::Plot {
+            x: axis(sweeps),
+            y: Axis::log(format!("{quantity}: {error}")),
+            series: series.collect(),
+        };
+        Panel { title: title.to_owned(), content }
+    }
+
+    fn points(&self, sweep: Sweep, quantity: &str, (approach, method, estimator): Who) -> Vec<Point> {
+        let of = |(place, value): (usize, &f64)| {
+            let value_is = value_name(*value);
+            let record = self.records.iter().find(|r| {
+                r.sequence == self.sequence
+                    && r.baseline == self.baseline.name()
+                    && r.sweep == sweep.name()
+                    && r.value == value_is
+                    && r.score.quantity == quantity
+                    && (r.score.approach == approach && r.score.method == method)
+                    && r.score.estimator == estimator
+            })?;
+            let figures = record.score.tally.figures()?;
+            let (x, y) = (place as f64, figures.erm_abs.unwrap_or(figures.eam).max(LEAST_DRAWN));
+            Some(Point { x, y, standard_error: figures.standard_error })
+        };
+        sweep.values().iter().enumerate().filter_map(of).collect()
+    }
+}
+
+/// The values of a sweep stand at equal distances, as in the paper.
+fn axis(sweeps: [Sweep; 2]) -> Axis {
+    let name = match sweeps {
+        [Sweep::Step, _] => "STEP",
+        [Sweep::Round, _] => "ROUND (levels per pixel)",
+        [Sweep::StdDisp, _] => "STD_DISP (px)",
+        [Sweep::Features, _] => "FEATURES",
+        _ => "STD_VEL, STD_TRACK (px)",
+    };
+    let place = |v: &f64| match () {
+        () if v.is_infinite() => "Inf.".to_owned(),
+        () if *v > 0.0 && *v < 1.0 => format!("1/{}", v.recip()),
+        () => v.to_string(),
+    };
+    Axis { name: name.to_owned(), layout: Layout::Places(sweeps[0].values().iter().map(place).collect()) }
+}

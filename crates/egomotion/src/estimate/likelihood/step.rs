@@ -1,0 +1,194 @@
+//! The sums over all observations from which maximum likelihood makes one Gauss–Newton step.
+
+use nalgebra::{ArrayStorage, Matrix6, SMatrix, Vector3, Vector6};
+use rayon::prelude::*;
+
+use crate::estimate::certainty::blocks::{BlockScore, Blocks};
+use crate::estimate::likelihood::mixture::Mixture;
+use crate::estimate::measurement::{At, Linearised, Measurement};
+use crate::geometry::gaussian::{accumulate, product};
+use crate::observe::{StereoFlow, StereoTrack};
+use crate::simd::vectorised;
+
+/// Sums over observations, by φ.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Step {
+    /// Σ w Gᵀ S⁻¹ G and Σ w Gᵀ S⁻¹ e.
+    pub(crate) score: BlockScore<6>,
+    /// By how much the score's true derivative is less than the information, because weights change as well.
+    reweighting: Matrix6<f64>,
+    /// Σ w Gᵀ S⁻¹ δe for errors that all observations share: amplitudes of the phase error of x, y and d, an offset of disparity.
+    pub(crate) shared: SMatrix<f64, 6, 4>,
+    /// Σ w.
+    weights: f64,
+    /// Σ w q.
+    pub(crate) weighted_square: f64,
+    /// Σ w² q.
+    score_square: f64,
+    /// Σ −2 (∂w/∂q) q, with q in its own units.
+    falling_off: f64,
+    /// Σ q.
+    pub(crate) square: f64,
+    /// Number of observations in front of the camera.
+    pub(crate) used: usize,
+    /// Number of observations that fit.
+    pub(crate) inliers: usize,
+}
+
+/// How observations are weighed and grouped.
+#[derive(Debug, Clone, Copy)]
+pub struct Weighing<'a> {
+    /// Blocks whose sums are wanted; without them all is one block.
+    pub(crate) blocks: Option<&'a Blocks>,
+    pub(crate) mixture: Mixture,
+    /// Squared scale of the misclosures in units of their stated covariance.
+    pub(crate) scale2: f64,
+}
+
+/// Squared misclosure, in units of its scaled covariance, beyond which an observation is no inlier: χ²₃(0.99).
+const INLIER_Q: f64 = 11.345;
+
+/// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
+const STRIP: usize = 512;
+
+impl Step {
+    /// Derivative of the score by φ, with the robust weights' own.
+    pub(crate) fn bread(&self) -> Matrix6<f64> {
+        self.score.information - self.reweighting
+    }
+
+    /// The next squared scale of the misclosures in units of their stated covariance.
+    ///
+    /// Σ w is the number of observations once the scale has settled; to divide by it in place of that
+    /// number makes few iterations of many (PX-EM: Liu, Rubin and Wu 1998).
+    pub(crate) fn scale2(&self) -> f64 {
+        self.weighted_square / (3.0 * self.weights)
+    }
+
+    /// Factor from the inverse of Σ w Gᵀ S⁻¹ G to the covariance, where residuals are independent and spherical.
+    ///
+    /// The sandwich B⁻¹ M B⁻¹, of which M = Σ w² q/3 Gᵀ S⁻¹ G and B = Σ (w + 2 q ∂w/∂q/3) Gᵀ S⁻¹ G are taken as
+    /// multiples of the information (Huber's proposal); the residuals of few observations are short by those of φ.
+    pub(crate) fn spread(&self) -> f64 {
+        let meat = self.score_square / (3.0 * self.weights);
+        let bread = 1.0 - self.falling_off / (3.0 * self.weights);
+        let residuals = (3 * self.used) as f64;
+        meat / (bread * bread) * residuals / (residuals - 6.0).max(1.0)
+    }
+
+    #[inline(always)]
+    fn add(&mut self, l: &Linearised, weighing: &Weighing<'_>) {
+        let scale2 = weighing.scale2;
+        let pull = product(&l.inverse_cov, &l.misclosure);
+        let q = l.misclosure.dot(&pull);
+        let (weight, slope) = weighing.mixture.weight(q / scale2);
+        let weighted = product(&l.by_motion.transpose(), &(l.inverse_cov * weight));
+        let unweighted: Vector6<f64> = product(&l.by_motion.transpose(), &pull);
+        accumulate(&mut self.score.information, &weighted, &l.by_motion);
+        accumulate(&mut self.score.score, &weighted, &l.misclosure);
+        let change = weight * slope / scale2;
+        accumulate(&mut self.reweighting, &(unweighted * change), &unweighted.transpose());
+        let [x, y, d] = l.by_phase.data.0;
+        let errors = SMatrix::<f64, 3, 4>::from_data(ArrayStorage([x, y, d, l.by_offset.into()]));
+        accumulate(&mut self.shared, &weighted, &errors);
+        self.weights += weight;
+        self.weighted_square += weight * q;
+        self.score_square += weight * weight * q;
+        self.falling_off += change * q;
+        self.square += q;
+        self.used += 1;
+        self.inliers += usize::from(q <= INLIER_Q * scale2);
+    }
+
+    fn merged(mut self, other: &Self) -> Self {
+        self.score.information += other.score.information;
+        self.score.score += other.score.score;
+        self.reweighting += other.reweighting;
+        self.shared += other.shared;
+        self.weights += other.weights;
+        self.weighted_square += other.weighted_square;
+        self.score_square += other.score_square;
+        self.falling_off += other.falling_off;
+        self.square += other.square;
+        self.used += other.used;
+        self.inliers += other.inliers;
+        self
+    }
+
+    /// Sums by the small motion δ of a measurement as sums by φ.
+    fn by_phi(mut self, jacobian: &Matrix6<f64>) -> Self {
+        let across = jacobian.transpose();
+        self.score.information = across * self.score.information * jacobian;
+        self.score.score = across * self.score.score;
+        self.reweighting = across * self.reweighting * jacobian;
+        self.shared = across * self.shared;
+        self
+    }
+}
+
+/// The sums of one step: of each block, and of all observations.
+#[derive(Debug, Clone)]
+pub(crate) struct Sums {
+    pub(crate) by_block: Vec<Step>,
+    pub(crate) whole: Step,
+}
+
+impl Sums {
+    /// Linearise about a motion and sum; structures are improved.
+    pub(crate) fn over<M: Measurement>(
+        observations: &[M],
+        structures: &mut [Vector3<f64>],
+        at: &At<'_>,
+        weighing: &Weighing<'_>,
+    ) -> Self {
+        let strips: Vec<Vec<(usize, Step)>> = observations
+            .par_chunks(STRIP)
+            .zip(structures.par_chunks_mut(STRIP))
+            .map(|(observations, structures)| M::sums(observations, structures, at, weighing))
+            .collect();
+        let mut by_block = vec![Step::default(); weighing.blocks.map_or(1, Blocks::count)];
+        for (block, step) in strips.iter().flatten() {
+            by_block[*block] = by_block[*block].merged(step);
+        }
+        let jacobian = M::by_phi(at);
+        by_block.iter_mut().for_each(|step| *step = step.by_phi(&jacobian));
+        let whole = by_block.iter().fold(Step::default(), Step::merged);
+        Self { by_block, whole }
+    }
+}
+
+vectorised! {
+    pub(crate) of_tracks(observations: &[StereoTrack], structures: &mut [Vector3<f64>], at: &At<'_>, weighing: &Weighing<'_>)
+        -> Vec<(usize, Step)> { strip(observations, structures, at, weighing) }
+}
+vectorised! {
+    pub(crate) of_flows(observations: &[StereoFlow], structures: &mut [Vector3<f64>], at: &At<'_>, weighing: &Weighing<'_>)
+        -> Vec<(usize, Step)> { strip(observations, structures, at, weighing) }
+}
+
+/// [`Measurement::sums`] of observations of any kind.
+#[inline(always)]
+fn strip<M: Measurement>(
+    observations: &[M],
+    structures: &mut [Vector3<f64>],
+    at: &At<'_>,
+    weighing: &Weighing<'_>,
+) -> Vec<(usize, Step)> {
+    let mut runs = Vec::new();
+    let mut run = (0, Step::default());
+    for (observation, structure) in observations.iter().zip(structures) {
+        let (x, y) = observation.position();
+        let block = weighing.blocks.map_or(0, |blocks| blocks.index(x, y));
+        if block != run.0 {
+            if run.1.used > 0 {
+                runs.push(run);
+            }
+            run = (block, Step::default());
+        }
+        if let Some(l) = observation.linearise(structure, at) {
+            run.1.add(&l, weighing);
+        }
+    }
+    runs.push(run);
+    runs
+}

@@ -1,0 +1,198 @@
+//! Least median of squares, equations (58) and (59).
+
+use documented::DocumentedFields;
+use nalgebra::SVector;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::estimate::linear::least_squares::{Weighting, least_squares};
+use crate::estimate::linear::median_search::{STRIP, square};
+pub use crate::estimate::linear::median_search::{Search, plain_search, search};
+use crate::estimate::{Fit, NormalEquations, Row, Unsolvable, median};
+
+/// How least median of squares searches and refits.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
+#[serde(default, deny_unknown_fields)]
+pub struct LmedsOptions {
+    /// Probability P that at least one subset is free of outliers.
+    pub confidence: f64,
+    /// Largest share ε of outliers that is provided for.
+    pub outliers: f64,
+    /// Residuals beyond this many robust standard deviations are outliers.
+    pub cut: f64,
+    /// Most refits by least squares to the inliers; 1 is the paper's, more let them settle.
+    pub reweights: usize,
+    /// Seed of the random subsets.
+    pub seed: u64,
+}
+
+impl Default for LmedsOptions {
+    fn default() -> Self {
+        Self { confidence: 0.99, outliers: 0.5, cut: 2.5, reweights: 20, seed: 1 }
+    }
+}
+
+/// Number of random p-subsets of which, with probability P, one is free of a share ε of outliers, (59).
+pub fn trials(confidence: f64, outliers: f64, subset: u32) -> usize {
+    let clean = (1.0 - outliers).powi(subset as i32);
+    if clean >= 1.0 {
+        return 1;
+    }
+    let exact = (1.0 - confidence).ln() / (1.0 - clean).ln();
+    // P = .99, ε = .1, p = 1 is exactly 2; rounding errors must not make it 3.
+    (exact * (1.0 - 1e-12)).ceil().max(1.0) as usize
+}
+
+/// `count` random subsets of N different indices below `rows`.
+pub fn random_subsets<const N: usize>(
+    rows: usize,
+    count: usize,
+    seed: u64,
+) -> impl Iterator<Item = [usize; N]> {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    (0..if rows < N { 0 } else { count }).map(move |_| {
+        let mut subset = [usize::MAX; N];
+        let mut filled = 0;
+        while filled < N {
+            let candidate = rng.random_range(0..rows);
+            if !subset[..filled].contains(&candidate) {
+                subset[filled] = candidate;
+                filled += 1;
+            }
+        }
+        subset
+    })
+}
+
+/// Robust standard deviation from the median of squared residuals, 1.4826 (1 + 5/(n − p)) √median.
+pub fn robust_scale(median_square: f64, rows: usize, unknowns: usize) -> f64 {
+    1.4826 * (1.0 + 5.0 / rows.saturating_sub(unknowns).max(1) as f64) * median_square.sqrt()
+}
+
+/// Search over random subsets, reject outliers by the robust scale, refit by least squares until the inliers settle.
+///
+/// # Errors
+/// [`Unsolvable`] with too few rows or when no subset determines θ.
+pub fn lmeds<const N: usize>(
+    rows: &[Row<N>],
+    weighting: Weighting,
+    options: &LmedsOptions,
+) -> Result<Fit<N>, Unsolvable> {
+    if rows.len() < N {
+        return Err(Unsolvable::FewRows { rows: rows.len(), needed: N });
+    }
+    let count = trials(options.confidence, options.outliers, N as u32);
+    let found = search(rows, weighting, random_subsets(rows.len(), count, options.seed))
+        .ok_or(Unsolvable::Unobservable)?;
+    refit(rows, weighting, &found, options)
+}
+
+/// Reject rows beyond the cut of the robust scale around a found subset, then refit by least squares.
+///
+/// With more than one refit the scale is taken anew around each answer: the best of few subsets lies so far from the
+/// minimum that its own median is up to a third too large.
+///
+/// Where many right-hand sides are exactly zero they were rounded, and the median knows only that no motion fits
+/// them perfectly. Then no row is an outlier whose residual its own σ explains, least squares of all rows is a second
+/// place to start from, and the better of the two answers is that with the lesser sum of squares in units of σ, cut off
+/// at the outliers' limit.
+///
+/// # Errors
+/// [`Unsolvable`] when the inliers determine nothing.
+pub fn refit<const N: usize>(
+    rows: &[Row<N>],
+    weighting: Weighting,
+    found: &Search<N>,
+    options: &LmedsOptions,
+) -> Result<Fit<N>, Unsolvable> {
+    let refitting =
+        Refitting { rows, weighting, options, rounded: options.reweights > 1 && are_rounded(rows) };
+    let first = refitting.settle(&found.theta, found.median_square);
+    if !refitting.rounded {
+        return first;
+    }
+    let all = least_squares(rows, weighting)?.theta;
+    let second = refitting.settle(&all, refitting.median_square(&all));
+    match (first, second) {
+        (Ok(first), Ok(second)) => {
+            let second_is_better = refitting.cost(&second.theta) < refitting.cost(&first.theta);
+            Ok(if second_is_better { second } else { first })
+        }
+        (first, second) => first.or(second),
+    }
+}
+
+/// Share of right-hand sides that are exactly zero from which on they must have been rounded.
+const ROUNDED: f64 = 0.05;
+
+/// Whether right-hand sides were rounded: a continuous measurement is never exactly zero.
+fn are_rounded<const N: usize>(rows: &[Row<N>]) -> bool {
+    let zeros = rows.iter().filter(|row| row.b == 0.0).count();
+    zeros as f64 > ROUNDED * rows.len() as f64
+}
+
+/// The end of an iteration whose θ moves by less than this share of a standard deviation.
+const SETTLED: f64 = 1e-3;
+
+/// What refits go by.
+struct Refitting<'a, const N: usize> {
+    rows: &'a [Row<N>],
+    weighting: Weighting,
+    options: &'a LmedsOptions,
+    rounded: bool,
+}
+
+impl<const N: usize> Refitting<'_, N> {
+    fn median_square(&self, theta: &SVector<f64, N>) -> f64 {
+        let mut squares: Vec<f64> =
+            self.rows.par_iter().with_min_len(STRIP).map(|row| square(row, self.weighting, theta)).collect();
+        median(&mut squares)
+    }
+
+    /// Weights of the rows within the cut around θ; none for the others.
+    fn kept(&self, theta: &SVector<f64, N>, scale: f64) -> Vec<f64> {
+        // Residuals of an exact fit are rounding errors; a scale of zero must not reject them all.
+        let limit = (self.options.cut * scale).powi(2).max(1e-24);
+        let weigh = |row: &Row<N>| {
+            let weight = self.weighting.of(row);
+            let own = if self.rounded { weight * (self.options.cut * row.sigma).powi(2) } else { 0.0 };
+            if weight * row.residual(theta).powi(2) <= limit.max(own) { weight } else { 0.0 }
+        };
+        self.rows.par_iter().with_min_len(STRIP).map(weigh).collect()
+    }
+
+    /// Least squares of what is kept, until that settles.
+    fn settle(&self, theta: &SVector<f64, N>, median_square: f64) -> Result<Fit<N>, Unsolvable> {
+        let scale_of = |median_square| robust_scale(median_square, self.rows.len(), N);
+        let mut scale = scale_of(median_square);
+        let mut weights = self.kept(theta, scale);
+        let mut equations = NormalEquations::weighted(self.rows, &weights);
+        let mut fit = equations.solve()?;
+        for _ in 1..self.options.reweights.max(1) {
+            scale = scale_of(self.median_square(&fit.0));
+            let next = self.kept(&fit.0, scale);
+            if next == weights {
+                break;
+            }
+            weights = next;
+            equations = NormalEquations::weighted(self.rows, &weights);
+            let last = std::mem::replace(&mut fit, equations.solve()?);
+            let moved = (fit.0 - last.0).component_mul(&equations.information.diagonal().map(f64::sqrt));
+            if moved.amax() <= SETTLED * scale {
+                break;
+            }
+        }
+        let (theta, observability) = fit;
+        let inliers = weights.iter().filter(|&&w| w > 0.0).count();
+        Ok(Fit { theta, weights, observability, bread: None, inliers, residual_scale: scale })
+    }
+
+    /// Sum of squared residuals in units of σ, none counted beyond the cut.
+    fn cost(&self, theta: &SVector<f64, N>) -> f64 {
+        let most = self.options.cut.powi(2);
+        // The lesser of the two is never NaN.
+        self.rows.iter().map(|row| (row.residual(theta) / row.sigma).powi(2).min(most)).sum()
+    }
+}
