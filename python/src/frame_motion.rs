@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egomotion::geometry::{Field, Grid, PixelBounds, RigidMotion};
 use egomotion::motion::{Obstacle, TimeToImpact};
-use egomotion::pipeline::stereo::DenseResults;
+use egomotion::pipeline::DenseResults;
 use egomotion::pipeline::{self, MovingGroup as Group};
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::prelude::*;

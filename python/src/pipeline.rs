@@ -1,6 +1,6 @@
 //! Frames in, motion out.
 
-use egomotion::pipeline::rgbd::VIRTUAL_BASELINE_M;
+use egomotion::pipeline::VIRTUAL_BASELINE_M;
 use egomotion::pipeline::{DepthCamera, DepthNoise, Frame, RgbdMotion as Rgbd, StereoMotion as Stereo};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

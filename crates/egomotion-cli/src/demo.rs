@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use egomotion::metrics;
-use egomotion::pipeline::stereo::DenseResults;
+use egomotion::pipeline::DenseResults;
 use egomotion::pipeline::{Config, StereoFrame, Unanswered};
 use egomotion::sim::{SensorNoise, Sequence, StereoImages};
 

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use egomotion::geometry::{Field, StereoRig};
 use egomotion::metrics::{self, Nees};
-use egomotion::pipeline::stereo::DenseResults;
+use egomotion::pipeline::DenseResults;
 use egomotion_io::source::TruthMaps;
 use serde::{Deserialize, Serialize};
 

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 use egomotion::estimate::Tolerance;
 use egomotion::geometry::{Camera, RigidMotion, StereoRectification, StereoRig};
-use egomotion::pipeline::rgbd::DepthNoise;
+use egomotion::pipeline::DepthNoise;
 use serde::Serialize;
 
 use crate::IoError;

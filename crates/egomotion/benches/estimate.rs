@@ -11,13 +11,12 @@ use egomotion::estimate::linear::least_squares::Weighting;
 use egomotion::estimate::linear::lmeds::{LmedsOptions, lmeds, plain_search, random_subsets, search, trials};
 use egomotion::estimate::sensor::systematic::common_errors;
 use egomotion::estimate::sensor::tolerance::TrackSource;
-use egomotion::geometry::Twist;
 use egomotion::motion::depth_velocity::{DisparityOffset, RigidPrediction};
 use egomotion::observe::tracks::{Hints, stereo_tracks};
 use egomotion::observe::{DensePair, DisparityMatcher, StereoPyramid, dense_flow};
-use egomotion::pipeline::Config;
-use egomotion::pipeline::maps::motion_maps;
+use egomotion::pipeline::plan::Interval;
 use egomotion::pipeline::solve::{Observed, solve};
+use egomotion::pipeline::{Config, motion_maps};
 use nalgebra::Vector6;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -34,17 +33,16 @@ fn estimation(c: &mut Criterion) {
     let tracks = stereo_tracks(&before, &after, &rig, Hints::default(), &config.tracks);
     let pair =
         DensePair { rig: &rig, before: &maps.0, after: &maps.1, flow: &flow, flow_right: None, given: false };
-    let start = solve(&Observed::Sparse(&tracks, TrackSource::Stereo), &rig, &Twist::zero(), &config, 0.1)
-        .unwrap()
-        .phi();
+    let interval = Interval::new(&rig, &config, TrackSource::Stereo, 0.1);
+    let start = solve(&Observed::Tracks(&tracks), &interval, None).unwrap().phi();
 
     c.bench_function("dense observations", |b| {
         b.iter(|| pair.every(config.sample_step_px, DensePair::stereo_track));
     });
     c.bench_function("solve, dense", |b| {
-        b.iter(|| solve(&Observed::Dense(pair, &tracks), &rig, &start, &config, 0.1));
+        b.iter(|| solve(&Observed::Fields(pair, &tracks), &interval, Some(&start)));
     });
-    let motion = solve(&Observed::Dense(pair, &tracks), &rig, &start, &config, 0.1).unwrap();
+    let motion = solve(&Observed::Fields(pair, &tracks), &interval, Some(&start)).unwrap();
     let kernel = &config.maximum_likelihood.kernel;
     c.bench_function("common errors of tracks", |b| {
         b.iter(|| common_errors(&tracks, &rig, &motion.phi(), kernel));
@@ -52,7 +50,7 @@ fn estimation(c: &mut Criterion) {
     let common = common_errors(&tracks, &rig, &motion.phi(), kernel).unwrap();
     let offset = DisparityOffset { sigma_px: 0.1, phi_per_px: common.by_disparity_offset };
     let rigid = RigidPrediction::new(&motion.theta, offset, &rig).unwrap();
-    c.bench_function("maps", |b| b.iter(|| motion_maps(&pair, Some(&rigid), None, &config, 0.1)));
+    c.bench_function("maps", |b| b.iter(|| motion_maps(&pair, Some(&rigid), None, &interval)));
 }
 
 /// Equations in six unknowns, a share of them outliers.

@@ -1,7 +1,7 @@
 //! A pipeline that goes on from what another one kept, after every frame and to the same bits.
 
 use egomotion::geometry::{Grid, Image, StereoRig};
-use egomotion::pipeline::stereo::StageTimes;
+use egomotion::pipeline::StageTimes;
 use egomotion::pipeline::{
     Config, Frame, FrameMotion, Observe, StereoFrame, StereoMotion, TrackMotion, TrackPoint, Unanswered,
 };
@@ -81,7 +81,7 @@ fn a_reference_that_is_lost_leaves_the_pipeline_as_it_was() {
     let mut whole = begin();
     whole.push(frames[0].clone());
     let memory = whole.memory();
-    assert_eq!(memory.reference(), Some(0));
+    assert_eq!(memory.reference_frame(), Some(0));
     let mut other = begin();
     let lost = other.recall(memory.clone(), |_| Err(Unanswered::MissingRight));
     assert_eq!(lost.unwrap_err(), Unanswered::MissingRight);

@@ -4,7 +4,7 @@ use egomotion::estimate::Estimate;
 use egomotion::geometry::{Gaussian, Grid, Image, Twist};
 use egomotion::metrics::Nees;
 use egomotion::motion::NoObstacle;
-use egomotion::pipeline::stereo::StageTimes;
+use egomotion::pipeline::StageTimes;
 use egomotion::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion, Trajectory, Unanswered};
 use egomotion::sim::{SensorNoise, Sequence};
 use nalgebra::{Matrix6, Vector6};
@@ -118,7 +118,7 @@ fn any_number_of_threads_gives_the_same_bits() {
     let (one, two) = (one.dense.unwrap(), two.dense.unwrap());
     // NaN is unlike itself: bits are compared.
     let bits = |grid: &Grid<f32>| grid.values().iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
-    let maps = |d: &egomotion::pipeline::stereo::DenseResults| {
+    let maps = |d: &egomotion::pipeline::DenseResults| {
         let m = &d.motion;
         let fields = [
             &d.disparity.shift,

@@ -1,6 +1,6 @@
 //! Where the time goes.
 
-use egomotion::pipeline::stereo::StageTimes;
+use egomotion::pipeline::StageTimes;
 
 /// Milliseconds by stage, summed over frames.
 #[derive(Default)]

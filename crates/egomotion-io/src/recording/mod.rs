@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use egomotion::estimate::Tolerance;
 use egomotion::geometry::{Grid, RigidMotion, StereoRig};
-use egomotion::pipeline::stereo::PipelineError;
+use egomotion::pipeline::PipelineError;
 use egomotion::pipeline::{Config, Frame, Observe, TrackPoint, Unanswered};
 
 use crate::source::{FrameFiles, Sequence};

@@ -1,7 +1,7 @@
 //! What turns frames into motion: images or tracks.
 
 use egomotion::geometry::{Grid, Image, StereoRig};
-use egomotion::pipeline::stereo::PipelineError;
+use egomotion::pipeline::PipelineError;
 use egomotion::pipeline::{
     Config, FrameMotion, StereoMemory, StereoMotion, TrackMemory, TrackMotion, Unanswered,
 };
@@ -88,7 +88,7 @@ impl Pipeline {
         match (self, memory) {
             (Self::Images(images), Memory::Images(memory)) => {
                 let mut left = None;
-                let reference = memory.reference().unwrap_or_default();
+                let reference = memory.reference_frame().unwrap_or_default();
                 let again = |k| match fetch(k).map(|fetched| fetched.frame) {
                     Some(Ok(Given::Frame(frame))) => {
                         left = Some(frame.left.clone());

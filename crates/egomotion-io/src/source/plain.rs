@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use egomotion::geometry::StereoRig;
-use egomotion::pipeline::rgbd::{DepthNoise, VIRTUAL_BASELINE_M};
+use egomotion::pipeline::{DepthNoise, VIRTUAL_BASELINE_M};
 use serde::Deserialize;
 
 use super::{Clock, DepthSensor, FrameFiles, Layout, Recognised, Sequence, listing};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use egomotion::estimate::Tolerance;
 use egomotion::geometry::{RigidMotion, StereoRig};
-use egomotion::pipeline::rgbd::DepthNoise;
+use egomotion::pipeline::DepthNoise;
 use nalgebra::Matrix3;
 
 use super::{Clock, DepthSensor, Layout, Recognised, Sequence, listing};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use egomotion::geometry::{Camera, Distortion, StereoRig};
-use egomotion::pipeline::rgbd::{DepthNoise, VIRTUAL_BASELINE_M};
+use egomotion::pipeline::{DepthNoise, VIRTUAL_BASELINE_M};
 
 use super::moments::{associate, pose_at, stamped_files};
 use super::{Clock, DepthSensor, FrameFiles, Layout, Recognised, Sequence, listing};

@@ -3,7 +3,7 @@
 use egomotion::geometry::{Grid, Image};
 use egomotion::metrics::quantile;
 use egomotion::motion::TimeToImpact;
-use egomotion::pipeline::stereo::DenseResults;
+use egomotion::pipeline::DenseResults;
 use jpeg_encoder::{ColorType, Encoder};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

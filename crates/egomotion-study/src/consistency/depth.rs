@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use egomotion::estimate::Tolerance;
 use egomotion::estimate::sensor::tolerance::ACCELERATION;
 use egomotion::geometry::{Field, Grid, Image, RigidMotion, StereoRig, Twist};
-use egomotion::pipeline::stereo::PipelineError;
+use egomotion::pipeline::PipelineError;
 use egomotion::pipeline::{Config, DepthCamera, DepthNoise, FrameMotion, Observe, RgbdMotion};
 use egomotion::sim::{DepthSensing, Scene, SensorNoise, View};
 

@@ -20,7 +20,7 @@ use super::{Cell, Publication, Study, Table};
 use crate::range::{COUNTS, OutOfRange, sequences, size, within};
 pub use depth::DepthKind;
 use egomotion::pipeline::Observe;
-use egomotion::pipeline::stereo::PipelineError;
+use egomotion::pipeline::PipelineError;
 use egomotion::sim::Sequence;
 use pair::Pair;
 

@@ -7,8 +7,8 @@ use rand_pcg::Pcg64Mcg;
 use super::depth::Camera;
 use super::{BySigma, Record, RenderedSensor};
 use egomotion::geometry::{RigidMotion, Twist};
-use egomotion::pipeline::stereo::{DenseResults, PipelineError};
 use egomotion::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion};
+use egomotion::pipeline::{DenseResults, PipelineError};
 use egomotion::sim::{Scene, SensorNoise, Sequence, View};
 
 /// How far a pose may lie from the sequence's own, in metres and degrees along and about each axis.

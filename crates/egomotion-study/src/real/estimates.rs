@@ -4,8 +4,8 @@ use egomotion::estimate::alignment::Form;
 use egomotion::estimate::{MotionEstimate, Unsolvable};
 use egomotion::geometry::{StereoRig, Twist};
 use egomotion::observe::{DensePair, DepthChange, StereoFlow, StereoTrack};
+use egomotion::pipeline::PipelineError;
 use egomotion::pipeline::solve::Solver;
-use egomotion::pipeline::stereo::PipelineError;
 use egomotion::pipeline::{Approach, Config, EstimatorKind, FrameMotion, Method, StereoFrame, StereoMotion};
 use egomotion::sim::StereoImages;
 

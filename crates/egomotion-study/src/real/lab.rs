@@ -12,7 +12,7 @@ use super::{depth_velocity, estimates, publish};
 use crate::range::{OutOfRange, sequences, size, within};
 use crate::{Publication, Study};
 use egomotion::estimate::MotionEstimate;
-use egomotion::pipeline::stereo::PipelineError;
+use egomotion::pipeline::PipelineError;
 use egomotion::sim::{Sequence, StereoImages};
 
 /// Tables 3 to 7 and Figures 11 to 14 on rendered images of lab-A … lab-M.

@@ -8,6 +8,7 @@ use crate::estimate::Tolerance;
 use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
 use crate::estimate::linear::lmeds::LmedsOptions;
 use crate::estimate::linear::m_estimator::StudentT;
+use crate::geometry::RigError;
 use crate::motion::impact::Vehicle;
 use crate::observe::disparity::AreaOptions;
 use crate::observe::flow::FlowError;
@@ -174,7 +175,32 @@ pub enum ConfigError {
     Flow(#[from] FlowError),
 }
 
+/// Why a pipeline cannot be built.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum PipelineError {
+    /// The rig cannot measure.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The choices do not fit together.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+}
+
+/// Keys of the configuration that were renamed, with what to write instead.
+const RENAMED_KEYS: [(&[&str], &str); 1] = [(&["window"], "[vehicle]")];
+
+/// What to write in place of a key that the configuration no longer has, as `["window"]`; `None` if it never had it.
+pub fn renamed_key(path: &[&str]) -> Option<&'static str> {
+    RENAMED_KEYS.iter().find(|(old, _)| path.starts_with(old)).map(|(_, new)| *new)
+}
+
 impl Config {
+    /// The options of maximum likelihood with the seed of the whole configuration mixed in.
+    pub(super) fn seeded_likelihood(&self) -> MaximumLikelihoodOptions {
+        let own = &self.maximum_likelihood;
+        MaximumLikelihoodOptions { seed: own.seed ^ self.seed, ..*own }
+    }
+
     /// Whether the choices fit together.
     ///
     /// # Errors

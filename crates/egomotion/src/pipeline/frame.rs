@@ -1,8 +1,10 @@
 //! What is given of one time: images, and what is known of them already.
 
-use super::unanswered::Unanswered;
+use super::answer::Unanswered;
+use super::memory::TimedFrame;
 use crate::geometry::{Field, Grid, Image, StereoRig};
-use crate::observe::{DisparityMap, FlowField};
+use crate::observe::tracks::StereoCorner;
+use crate::observe::{DisparityMap, FlowField, StereoPyramid};
 
 /// A rectified pair of images of one time.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +20,7 @@ pub struct StereoFrame {
 /// What is given of one time: the left image, and a right image or disparity or both.
 ///
 /// What is given is not computed. Without a right image the corners take their disparity from the map
-/// too: a depth camera is a rig whose disparity is given (see [`super::rgbd`]).
+/// too: a depth camera is a rig whose disparity is given (see [`super::RgbdMotion`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
     /// Time in seconds; it must increase from frame to frame.
@@ -39,7 +41,7 @@ impl From<StereoFrame> for Frame {
     }
 }
 
-/// Least standard deviation of the grey levels of a usable image.
+/// Least standard deviation of a usable image's grey levels, on the scale of 0 to 255.
 const LEAST_CONTRAST: f64 = 1.0;
 
 impl Frame {
@@ -81,6 +83,39 @@ impl Frame {
             None => Ok(()),
         }
     }
+}
+
+/// A frame with all that is computed of it alone: what later ones are matched with.
+#[derive(Debug)]
+pub(super) struct PreparedFrame {
+    /// Index, counted over all frames pushed or skipped.
+    pub(super) frame: usize,
+    pub(super) time_s: f64,
+    pub(super) images: StereoPyramid,
+    pub(super) disparity: Option<DisparityMap>,
+    /// Given flow to the next frame.
+    pub(super) flow: Option<FlowField>,
+    /// Corners that were followed here from the frame before.
+    pub(super) corners: Vec<StereoCorner>,
+}
+
+impl TimedFrame for PreparedFrame {
+    fn moment(&self) -> (usize, f64) {
+        (self.frame, self.time_s)
+    }
+}
+
+impl PreparedFrame {
+    /// Whether it is a copy of another: in its images, and where they are `blank` in its disparity too.
+    pub(super) fn repeats(&self, other: &Self, blank: bool) -> bool {
+        let same_shape = || self.disparity.as_ref().map(bits) == other.disparity.as_ref().map(bits);
+        self.images.repeats(&other.images) && (!blank || same_shape())
+    }
+}
+
+/// The values of a map, missing pixels included, for comparison.
+fn bits(map: &DisparityMap) -> Vec<u32> {
+    map.shift.grid().values().iter().map(|value| value.to_bits()).collect()
 }
 
 /// Whether a plane is as wide and high as the rig's images.

@@ -1,47 +1,155 @@
-//! What a pipeline keeps of the frames that it has seen, without their images: small enough for a file.
+//! What goes on from frame to frame, be they images or tracks.
 //!
-//! The memory has no fixed length in frames: a corner may be followed as long as it is seen. So an interrupted
-//! sequence does not go on by pushing its last few frames again, but from here, and then to the same bits.
+//! Without images it is small enough for a file. It has no fixed length in frames: a corner may be followed as long as
+//! it is seen. So an interrupted sequence does not go on by pushing its last few frames again, but from here, and then
+//! to the same bits.
 
 use serde::{Deserialize, Serialize};
 
-use super::given_tracks::TrackPoint;
+use super::answer::{FrameMotion, Unanswered};
 use crate::geometry::Twist;
 use crate::observe::tracks::StereoCorner;
 
-/// The memory of a [`super::StereoMotion`]; what is computed of its reference frame alone is computed again.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct StereoMemory {
-    pub(super) frames: usize,
-    pub(super) last_time_s: Option<f64>,
-    pub(super) reference: Option<KeptFrame>,
-    pub(super) velocity: Option<Twist>,
-    pub(super) failures: usize,
+/// After this many good frames without an answer the reference frame itself is given up: it may be the bad one.
+const FAILURES_UNTIL_GIVEN_UP: usize = 2;
+
+/// A frame that later ones can be matched with.
+pub trait TimedFrame {
+    /// Index, counted over all frames pushed or skipped, and time in seconds.
+    fn moment(&self) -> (usize, f64);
 }
 
-/// The frame that the next one is matched with.
+/// What a pipeline keeps of the frames that it has seen; `F` is what it keeps of the last good one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct KeptFrame {
-    pub(super) frame: usize,
-    pub(super) time_s: f64,
-    /// Corners that were followed here.
-    pub(super) corners: Vec<StereoCorner>,
+pub struct Memory<F> {
+    /// Frames pushed or skipped so far.
+    frames: usize,
+    /// The last time stamp that could be used.
+    last_time_s: Option<f64>,
+    /// The frame that the next one is matched with.
+    reference: Option<F>,
+    /// Velocity per second of the last answer.
+    velocity: Option<Twist>,
+    /// Frames since the reference that gave no answer though they were good.
+    failures: usize,
 }
 
-impl StereoMemory {
-    /// Index of the frame that the next one is matched with, counted over all frames pushed or skipped.
-    pub fn reference(&self) -> Option<usize> {
-        self.reference.as_ref().map(|reference| reference.frame)
+impl<F> Memory<F> {
+    /// Of no frame yet.
+    pub(super) fn new() -> Self {
+        Self { frames: 0, last_time_s: None, reference: None, velocity: None, failures: 0 }
+    }
+
+    /// Index that the next frame has.
+    pub(super) fn next_frame(&self) -> usize {
+        self.frames
+    }
+
+    pub(super) fn reference(&self) -> Option<&F> {
+        self.reference.as_ref()
+    }
+
+    pub(super) fn reference_mut(&mut self) -> Option<&mut F> {
+        self.reference.as_mut()
+    }
+
+    pub(super) fn take_reference(&mut self) -> Option<F> {
+        self.reference.take()
+    }
+
+    pub(super) fn set_reference(&mut self, frame: F) {
+        self.reference = Some(frame);
+    }
+
+    /// Whether a time can follow the last one.
+    ///
+    /// # Errors
+    /// [`Unanswered::BadTime`] if it cannot.
+    pub(super) fn check_time(&self, time_s: f64) -> Result<(), Unanswered> {
+        let increases = self.last_time_s.is_none_or(|last| time_s > last);
+        if increases && time_s.is_finite() { Ok(()) } else { Err(Unanswered::BadTime) }
+    }
+
+    pub(super) fn set_time(&mut self, time_s: f64) {
+        self.last_time_s = Some(time_s);
+    }
+
+    /// The motion over `dt_s` seconds, if it goes on as it was.
+    pub(super) fn expected_motion(&self, dt_s: f64) -> Option<Twist> {
+        self.velocity.map(|velocity| velocity.scaled(dt_s))
+    }
+
+    /// What is left of it when `keep` has taken what it needs of the last good frame.
+    pub(super) fn kept<G>(&self, keep: impl FnOnce(&F) -> G) -> Memory<G> {
+        let &Self { frames, last_time_s, velocity, failures, .. } = self;
+        let reference = self.reference.as_ref().map(keep);
+        Memory { frames, last_time_s, reference, velocity, failures }
+    }
+
+    /// The same memory with something else kept of the last good frame.
+    pub(super) fn map<G>(self, change: impl FnOnce(F) -> G) -> Memory<G> {
+        let Self { frames, last_time_s, reference, velocity, failures } = self;
+        Memory { frames, last_time_s, reference: reference.map(change), velocity, failures }
+    }
+
+    /// The memory again, with the last good frame that `restore` makes of what was kept.
+    ///
+    /// # Errors
+    /// Those of `restore`.
+    pub(super) fn restored<G, E>(self, restore: impl FnOnce(F) -> Result<G, E>) -> Result<Memory<G>, E> {
+        let Self { frames, last_time_s, reference, velocity, failures } = self;
+        let reference = reference.map(restore).transpose()?;
+        Ok(Memory { frames, last_time_s, reference, velocity, failures })
     }
 }
 
-/// The memory of a [`super::TrackMotion`].
+impl<F: TimedFrame> Memory<F> {
+    /// Count a frame that gives no motion; what it would be matched with stays.
+    pub(super) fn skip(&mut self, time_s: f64, why: Unanswered) -> FrameMotion {
+        let reference = self.reference.as_ref().map(F::moment);
+        self.count_unanswered(time_s, reference, why)
+    }
+
+    /// Count a frame that gives no motion since the frame of a moment.
+    pub(super) fn count_unanswered(
+        &mut self,
+        time_s: f64,
+        reference: Option<(usize, f64)>,
+        why: Unanswered,
+    ) -> FrameMotion {
+        let frame = self.frames;
+        self.frames += 1;
+        FrameMotion::unanswered((frame, time_s), reference, why)
+    }
+
+    /// Keep what the next frame needs of an answer, and return the frame that is not needed again.
+    ///
+    /// After a failure the earlier frame is kept, until too many have failed.
+    pub(super) fn remember(&mut self, answer: &FrameMotion, before: F, here: F) -> F {
+        self.frames += 1;
+        self.failures = if answer.motion.is_ok() { 0 } else { self.failures + 1 };
+        self.velocity = match (&answer.motion, answer.dt_s) {
+            (Ok(motion), Some(dt)) if motion.is_complete() => Some(motion.phi().scaled(1.0 / dt)),
+            _ => None,
+        };
+        let keep_old = answer.motion.is_err() && self.failures < FAILURES_UNTIL_GIVEN_UP;
+        let (kept, gone) = if keep_old { (before, here) } else { (here, before) };
+        self.reference = Some(kept);
+        gone
+    }
+}
+
+/// What is kept of a frame of images: where corners were followed to. All else is computed again.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct TrackMemory {
-    pub(super) frames: usize,
-    pub(super) last_time_s: Option<f64>,
-    /// Index, time and points of the frame that the next one is compared with.
-    pub(super) reference: Option<(usize, f64, Vec<TrackPoint>)>,
-    pub(super) velocity: Option<Twist>,
-    pub(super) failures: usize,
+pub struct KeptFrame {
+    pub(super) frame: usize,
+    pub(super) time_s: f64,
+    pub(super) corners: Vec<StereoCorner>,
+}
+
+impl Memory<KeptFrame> {
+    /// Index of the frame that the next one is matched with, counted over all frames pushed or skipped.
+    pub fn reference_frame(&self) -> Option<usize> {
+        self.reference.as_ref().map(|reference| reference.frame)
+    }
 }

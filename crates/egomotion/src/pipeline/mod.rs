@@ -1,29 +1,32 @@
 //! From frames to motion: the one place where all steps meet.
+//!
+//! [`StereoMotion`], [`RgbdMotion`] and [`TrackMotion`] take one frame after the other. [`Config`] holds every choice;
+//! from it a [`plan::Plan`] follows once, and two frames are compared step by step as it says: observe, solve for φ,
+//! interpret. What goes on from frame to frame is one value, [`Memory`].
 
+mod answer;
 pub mod config;
-mod contested;
-pub mod frame;
+mod depth_camera;
+mod frame;
 mod frame_pair;
-pub mod given_tracks;
-pub mod groups;
-mod map_row;
-pub mod maps;
-pub mod memory;
-mod moving;
-pub mod rgbd;
-mod shape;
+mod interpret;
+mod memory;
+pub mod plan;
 pub mod solve;
-pub mod stereo;
-mod track_solver;
-pub mod trajectory;
-pub mod unanswered;
+mod stages;
+mod stereo_motion;
+mod track_motion;
+mod trajectory;
 
-pub use config::{Approach, Config, ConfigError, EstimatorKind, Method, Observe, meaning};
+pub use answer::{DenseResults, FrameMotion, Unanswered};
+pub use config::{
+    Approach, Config, ConfigError, EstimatorKind, Method, Observe, PipelineError, meaning, renamed_key,
+};
+pub use depth_camera::{DepthCamera, DepthNoise, RgbdMotion, VIRTUAL_BASELINE_M};
 pub use frame::{Frame, StereoFrame};
-pub use given_tracks::{TrackMotion, TrackPoint};
-pub use groups::MovingGroup;
-pub use memory::{StereoMemory, TrackMemory};
-pub use rgbd::{DepthCamera, DepthNoise, RgbdMotion};
-pub use stereo::{FrameMotion, StereoMotion};
+pub use interpret::{MotionMaps, MovingGroup, motion_maps};
+pub use memory::Memory;
+pub use stages::StageTimes;
+pub use stereo_motion::{StereoMemory, StereoMotion};
+pub use track_motion::{TrackMemory, TrackMotion, TrackPoint};
 pub use trajectory::Trajectory;
-pub use unanswered::Unanswered;

@@ -2,7 +2,7 @@
 
 use crate::geometry::{RigidMotion, Twist};
 
-use super::stereo::FrameMotion;
+use super::answer::FrameMotion;
 
 /// Camera poses world_from_camera, the first the identity, one for each frame.
 #[derive(Debug, Clone, Default, PartialEq)]

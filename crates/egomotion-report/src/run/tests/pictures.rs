@@ -2,8 +2,8 @@
 
 use egomotion::geometry::{Field, Grid, Image};
 use egomotion::observe::{DisparityMap, FlowField};
-use egomotion::pipeline::maps::MotionMaps;
-use egomotion::pipeline::stereo::DenseResults;
+use egomotion::pipeline::DenseResults;
+use egomotion::pipeline::MotionMaps;
 
 use super::super::{Album, FramePictures, render};
 use super::steady;

@@ -7,10 +7,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::config::Config;
+use super::answer::{FrameMotion, Unanswered};
+use super::config::{Config, PipelineError};
 use super::frame::Frame;
-use super::stereo::{FrameMotion, PipelineError, StereoMotion};
-use super::unanswered::Unanswered;
+use super::stereo_motion::StereoMotion;
 use crate::estimate::Tolerance;
 use crate::geometry::{Field, Grid, Image, StereoRig};
 use crate::observe::DisparityMap;

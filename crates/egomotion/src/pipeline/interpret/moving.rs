@@ -7,12 +7,13 @@ use crate::motion::depth_velocity::RigidPrediction;
 use crate::observe::temporal_disparity::{Seen, disparity_change};
 use crate::observe::{DensePair, StereoPyramid};
 
-/// Side of a cell, in pixels.
+/// Side of the cells in which moving pixels are gathered, in pixels. [`Moving::index`] divides by it, so it is a power of
+/// two.
 const CELL_PX: usize = 4;
-/// Every so many pixels of a cell are asked whether they contradict the rigid motion.
+/// Distance of the pixels of a cell that are compared with the rigid motion, in both directions.
 const PROBE_PX: usize = 2;
-/// Disparities that differ by a larger share belong to other surfaces.
-const SAME_SURFACE: f64 = 0.05;
+/// Neighbours whose disparities differ by less than this share of the larger one are of one surface.
+const SAME_SURFACE_SHARE: f64 = 0.05;
 
 /// Cells of the image that do not move with the rigid scene.
 #[derive(Debug, Clone)]
@@ -76,7 +77,7 @@ impl Moving {
 
     /// Whether two disparities may be those of one surface, seen by neighbours.
     pub(super) fn same_surface(a: f64, b: f64) -> bool {
-        (a - b).abs() < SAME_SURFACE * a.max(b)
+        (a - b).abs() < SAME_SURFACE_SHARE * a.max(b)
     }
 
     /// d and d′ of a pixel in a cell that moves; `Some(None)` where they are not known, `None` elsewhere.

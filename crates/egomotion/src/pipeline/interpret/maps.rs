@@ -3,14 +3,14 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::config::Config;
 use super::groups::Groups;
-use super::map_row::{MapRow, Scene};
-use crate::geometry::{Cells, Field, Gaussian, Grid, StereoRig};
+use super::map_row::{MapRow, PairToMap};
+use crate::geometry::{Cells, Field, Gaussian, Grid};
 use crate::motion::TimeToImpact;
 use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
 use crate::motion::obstacle::{ObstacleCriteria, Sightings};
 use crate::observe::{DensePair, StereoTrack};
+use crate::pipeline::plan::Interval;
 
 /// Per-pixel results on the pixel grid of the earlier frame; missing pixels are NaN.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,12 +51,11 @@ pub fn motion_maps(
     pair: &DensePair<'_>,
     rigid: Option<&RigidPrediction<'_>>,
     groups: Option<&Groups<'_>>,
-    config: &Config,
-    dt_s: f64,
+    interval: &Interval<'_>,
 ) -> (MotionMaps, Vec<Sightings>) {
     let (width, height) = pair.flow.size();
     let cell_px = ObstacleCriteria::DENSE.cell_px;
-    let scene = Scene { pair, rigid, groups, config, dt_s };
+    let pair = PairToMap { pair, rigid, groups, interval };
     let mut planes: [Grid<f32>; 4] = std::array::from_fn(|_| Grid::filled(width, height, 0.0));
     let [vz, sigma, looming, looming_sigma] =
         planes.each_mut().map(|plane| plane.values_mut().par_chunks_mut((width * cell_px).max(1)));
@@ -70,7 +69,7 @@ pub fn motion_maps(
                 let rates = looming.chunks_mut(width).zip(looming_sigma.chunks_mut(width));
                 let mut seen = vec![Sightings::default(); width.div_ceil(cell_px)];
                 for (v, ((vz, sigma), (looming, looming_sigma))) in rows.zip(rates).enumerate() {
-                    row.fill(&scene, strip * cell_px + v, [vz, sigma, looming, looming_sigma]);
+                    row.fill(&pair, strip * cell_px + v, [vz, sigma, looming, looming_sigma]);
                     for u in 0..width {
                         if let Some((impact, crosses)) = row.seen(u) {
                             seen[u / cell_px].add(impact, crosses);
@@ -95,24 +94,22 @@ fn crosses(
     rigid: &RigidPrediction<'_>,
     before: &Vector3<f64>,
     impact: &TimeToImpact,
-    config: &Config,
-    dt_s: f64,
+    interval: &Interval<'_>,
 ) -> bool {
     impact.seconds().is_some_and(|seconds| {
         let later = rigid.motion().apply(before);
-        let velocity = (later - before) / dt_s;
-        config.vehicle.is_crossed_by(&later, &velocity, seconds)
+        let velocity = (later - before) / interval.dt_s;
+        interval.config.vehicle.is_crossed_by(&later, &velocity, seconds)
     })
 }
 
 /// What tracks show of the nearest obstacle, in each cell of [`ObstacleCriteria::SPARSE`].
-pub fn track_sightings(
+pub(super) fn track_sightings(
     tracks: &[StereoTrack],
     rigid: &RigidPrediction<'_>,
-    rig: &StereoRig,
-    config: &Config,
-    dt_s: f64,
+    interval: &Interval<'_>,
 ) -> Vec<Sightings> {
+    let rig = interval.rig;
     let (width, height) = (rig.width_px, rig.height_px);
     let cells = Cells::over((width, height), ObstacleCriteria::SPARSE.cell_px);
     let mut seen = vec![Sightings::default(); cells.count()];
@@ -123,12 +120,12 @@ pub fn track_sightings(
         let measured = depth_velocity::dv_discrete(track, rig.depth_disparity_product());
         let predicted = rigid.depth_velocity(xyd, track.before.sigma(2));
         let velocity = rigid_unless_moving(Some(measured), predicted);
-        let looming = velocity.and_then(|velocity| velocity.looming(dt_s));
+        let looming = velocity.and_then(|velocity| velocity.looming(interval.dt_s));
         let Some((before, looming)) = rig.point(xyd).zip(looming) else { continue };
         let impact = TimeToImpact { looming };
         let (u, v) = rig.pixel_from_image(xyd.x, xyd.y);
         let cell = cells.index(pixel(u, width), pixel(v, height));
-        seen[cell].add(impact, crosses(rigid, &before, &impact, config, dt_s));
+        seen[cell].add(impact, crosses(rigid, &before, &impact, interval));
     }
     seen
 }

@@ -8,20 +8,23 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::config::Config;
-use super::solve::{SETTLED, Solver};
+use super::solver::{SETTLED_SIGMAS, Solver};
 use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
 use crate::estimate::linear::m_estimator::StudentT;
 use crate::estimate::sensor::tolerance::{SensedTrack, SensorErrors, TrackSource};
 use crate::estimate::{MotionEstimate, Unsolvable, median};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::{DensePair, StereoTrack};
+use crate::pipeline::config::Config;
+use crate::pipeline::plan::Interval;
 
-/// Most times that the shape is looked at again from where the last motion leads.
-const ROUNDS: usize = 10;
-/// Disparities further from the prediction than this are of another surface, in pixels: at first without any motion
-/// to start from, and in the end.
-const OTHER_SURFACE_PX: (f64, f64) = (8.0, 1.0);
+/// The shape is looked at again at most this many times from where the last motion leads.
+const SHAPE_ROUNDS: usize = 10;
+/// Without a motion to start from, disparities further from the prediction than this are of another surface, in pixels.
+/// The limit is halved round by round.
+const FIRST_REACH_PX: f64 = 8.0;
+/// In the end disparities further from the prediction than this are of another surface, in pixels.
+const LAST_REACH_PX: f64 = 1.0;
 /// Medians of χ² with one and with two degrees of freedom.
 const MEDIAN_1: f64 = 0.455;
 const MEDIAN_2: f64 = 1.386;
@@ -38,36 +41,36 @@ pub(super) fn solve_with_shape(
     pair: &DensePair<'_>,
     corners: &[StereoTrack],
     start: Option<&Twist>,
-    config: &Config,
-    dt_s: f64,
+    interval: &Interval<'_>,
 ) -> Result<MotionEstimate, Unsolvable> {
     // The mixture takes every residual as one in three dimensions; shape has one, beside which places would look like outliers.
-    let config =
-        &Config { maximum_likelihood: without_mixture(&config.maximum_likelihood), ..config.clone() };
+    let config = &without_mixture(interval.config);
     let tracked = Tracked { flow: pair.every(config.sample_step_px, DensePair::stereo_track), corners };
     let mut phi = start.copied().unwrap_or_else(Twist::zero);
-    let mut reach = if start.is_some() { OTHER_SURFACE_PX.1 } else { OTHER_SURFACE_PX.0 };
+    let mut reach = if start.is_some() { LAST_REACH_PX } else { FIRST_REACH_PX };
     let mut errors = SensorErrors::none();
     let mut round = 0;
     loop {
-        let near = reach <= OTHER_SURFACE_PX.1;
+        let near = reach <= LAST_REACH_PX;
         let all = observations(pair, &tracked, &phi, &errors, reach, config);
         let solver = Solver::new(pair.rig, &phi, config);
         // Far from the answer it is not the sensor that is wrong.
-        let solver = if near { solver.over(dt_s) } else { solver };
+        let solver = if near { solver.with_tolerance(interval.dt_s) } else { solver };
         let found = solver.round(&all, &mut errors)?;
         let moved = found.moved_from(&phi);
         phi = found.phi();
         round += 1;
-        if (near && moved.is_finite() && moved < SETTLED) || round == ROUNDS {
+        if (near && moved.is_finite() && moved < SETTLED_SIGMAS) || round == SHAPE_ROUNDS {
             return Ok(found);
         }
-        reach = (0.5 * reach).max(OTHER_SURFACE_PX.1);
+        reach = (0.5 * reach).max(LAST_REACH_PX);
     }
 }
 
-fn without_mixture(options: &MaximumLikelihoodOptions) -> MaximumLikelihoodOptions {
-    MaximumLikelihoodOptions { kernel: StudentT { fitted: false, ..options.kernel }, ..*options }
+fn without_mixture(config: &Config) -> Config {
+    let own = &config.maximum_likelihood;
+    let kernel = StudentT { fitted: false, ..own.kernel };
+    Config { maximum_likelihood: MaximumLikelihoodOptions { kernel, ..*own }, ..config.clone() }
 }
 
 /// Points whose places were found in both images.

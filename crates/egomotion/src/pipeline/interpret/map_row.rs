@@ -5,23 +5,22 @@
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use super::config::{Approach, Config, Method};
 use super::groups::Groups;
 use crate::geometry::{Gaussian, StereoRig};
 use crate::motion::DepthVelocity;
 use crate::motion::depth_velocity::{self, RigidPrediction, contradict};
 use crate::motion::impact::{TimeToImpact, Vehicle};
 use crate::observe::DensePair;
+use crate::pipeline::plan::{Interval, PixelVelocity};
 use crate::simd::vectorised;
 
 /// What the rows of a pair of frames share.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Scene<'a> {
+pub(super) struct PairToMap<'a> {
     pub(super) pair: &'a DensePair<'a>,
     pub(super) rigid: Option<&'a RigidPrediction<'a>>,
     pub(super) groups: Option<&'a Groups<'a>>,
-    pub(super) config: &'a Config,
-    pub(super) dt_s: f64,
+    pub(super) interval: &'a Interval<'a>,
 }
 
 /// The rays of a row's pixels.
@@ -72,32 +71,33 @@ impl MapRow {
     }
 
     /// Row `v` of a pair of frames.
-    pub(super) fn fill(&mut self, scene: &Scene<'_>, v: usize, out: Output<'_>) {
-        let &Scene { pair, rigid, config, dt_s, .. } = scene;
+    pub(super) fn fill(&mut self, all: &PairToMap<'_>, v: usize, out: Output<'_>) {
+        let &PairToMap { pair, rigid, groups, interval } = all;
+        let (by, dt_s) = (interval.plan.pixel_velocity, interval.dt_s);
         let rays = Rays { rig: pair.rig, start: pair.rig.image_from_pixel(0.0, v as f64) };
-        match (config.method, rigid) {
-            (Method::Dcce | Method::Dv, _) | (_, None) => {
+        match rigid.filter(|_| by == PixelVelocity::RigidScene) {
+            None => {
                 for u in 0..self.width() {
-                    self.set_velocity(u, measured(pair, config, u, v));
+                    self.set_velocity(u, measured_velocity(pair, by, u, v));
                 }
             }
-            (_, Some(rigid)) => {
+            Some(rigid) => {
                 for u in 0..self.width() {
-                    self.observe(scene, u, v);
+                    self.observe(pair, groups, u, v);
                 }
                 unless_moving(rigid, rays, &self.disparities, &self.sigma, &mut self.velocity);
-                if let Some(groups) = scene.groups {
-                    self.follow(groups, rays, v);
+                if let Some(groups) = groups {
+                    self.follow_bodies(groups, rays, v);
                 }
             }
         }
         loomings(&self.velocity, dt_s, &mut self.looming, out);
         match rigid {
             Some(rigid) => {
-                let when = (&config.vehicle, dt_s);
+                let when = (&interval.config.vehicle, dt_s);
                 crossings(rigid, rays, when, &self.velocity[0], &self.looming[0], &mut self.crosses);
-                if let Some(groups) = scene.groups {
-                    self.cross_alone(groups, rays, when, v);
+                if let Some(groups) = groups {
+                    self.bodies_cross(groups, rays, when, v);
                 }
             }
             None => self.crosses.fill(false),
@@ -106,11 +106,10 @@ impl MapRow {
 
     /// The disparities of one pixel.
     #[inline(always)]
-    fn observe(&mut self, scene: &Scene<'_>, u: usize, v: usize) {
-        let pair = scene.pair;
+    fn observe(&mut self, pair: &DensePair<'_>, groups: Option<&Groups<'_>>, u: usize, v: usize) {
         self.disparities[0][u] = pair.rig.disparity_from_shift(f64::from(pair.before.shift.row(v)[u]));
         self.sigma[u] = f64::from(pair.before.sigma.row(v)[u]);
-        match scene.groups.and_then(|groups| groups.moving.disparities(pair, u, v)) {
+        match groups.and_then(|groups| groups.moving.disparities(pair, u, v)) {
             // Then the rigid motion says nothing.
             Some(own) => {
                 self.sigma[u] = f64::NAN;
@@ -121,7 +120,7 @@ impl MapRow {
     }
 
     /// The pixels of bodies that move by themselves move as their bodies do.
-    fn follow(&mut self, groups: &Groups<'_>, rays: Rays<'_>, v: usize) {
+    fn follow_bodies(&mut self, groups: &Groups<'_>, rays: Rays<'_>, v: usize) {
         let bf = rays.rig.depth_disparity_product();
         for u in 0..self.width() {
             let Some(body) = groups.body(u, v) else { continue };
@@ -148,7 +147,7 @@ impl MapRow {
     }
 
     /// Whether pixels that move by themselves cross the window: as their bodies move, and never where they make none.
-    fn cross_alone(&mut self, groups: &Groups<'_>, rays: Rays<'_>, when: (&Vehicle, f64), v: usize) {
+    fn bodies_cross(&mut self, groups: &Groups<'_>, rays: Rays<'_>, when: (&Vehicle, f64), v: usize) {
         for u in 0..self.width() {
             let Some(body) = groups.body(u, v) else {
                 self.crosses[u] &= !groups.moving.is_moving(u, v);
@@ -193,20 +192,18 @@ impl MapRow {
     }
 }
 
-/// VZ of a pixel as the configured method measures it.
-fn measured(pair: &DensePair<'_>, config: &Config, u: usize, v: usize) -> Option<DepthVelocity> {
+/// VZ of a pixel as it is measured there. Without a motion of the scene the change of disparity answers.
+fn measured_velocity(pair: &DensePair<'_>, by: PixelVelocity, u: usize, v: usize) -> Option<DepthVelocity> {
     let bf = pair.rig.depth_disparity_product();
-    match (config.method, config.approach) {
-        (Method::Dcce, Approach::Discrete) => {
-            Some(depth_velocity::dcce(&pair.depth_track(u, v)?.depth_change(bf)))
-        }
-        (Method::Dcce, Approach::Differential) => {
+    match by {
+        PixelVelocity::DepthTrack => Some(depth_velocity::dcce(&pair.depth_track(u, v)?.depth_change(bf))),
+        PixelVelocity::DepthFlow => {
             Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)).from_middle())
         }
-        (Method::Dv, Approach::Differential) => {
-            Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf).from_middle())
+        PixelVelocity::StereoFlow => Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf).from_middle()),
+        PixelVelocity::Disparities | PixelVelocity::RigidScene => {
+            Some(DepthVelocity::from_disparities(&pair.disparities(u, v)?, bf))
         }
-        _ => Some(DepthVelocity::from_disparities(&pair.disparities(u, v)?, bf)),
     }
 }
 

@@ -6,30 +6,31 @@ use nalgebra::{Vector3, Vector6};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::config::Config;
 use super::moving::Moving;
-use super::solve::Solver;
-use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
 use crate::estimate::likelihood::robust_start::robust_start;
 use crate::estimate::{Blocks, MotionEstimate, median};
 use crate::geometry::{Cells, Gaussian, PixelBounds, StereoRig, upper_median};
 use crate::motion::TimeToImpact;
 use crate::motion::depth_velocity::{DepthVelocity, RigidPrediction, contradict};
 use crate::observe::{DensePair, StereoTrack};
+use crate::pipeline::config::Config;
+use crate::pipeline::plan::Interval;
+use crate::pipeline::solve::Solver;
 
-/// Fewest cells of a group: single mismatches are none.
+/// Fewest cells of a group. Smaller regions are most often mismatches.
 const LEAST_CELLS: usize = 12;
-/// Fewest of them that have all four neighbours in the group: at depth edges wrong disparities make seams two or
-/// three cells wide.
+/// Fewest cells of a group that have all four neighbours in it. At depth edges wrong disparities make seams two or three
+/// cells wide, which have none.
 const LEAST_ENCLOSED: usize = 4;
-/// Least share of them whose patch was found again in all four images: wrong flow and hidden places are not.
-const LEAST_CONFIRMED: f64 = 0.3;
-/// Every so many pixels in both directions observe the group's motion.
-const STEP: usize = 2;
-/// Side of the blocks of pixels that count as independent: a group has few of the scene's larger ones.
+/// Least share of a group's cells whose patch was found again in all four images. Wrong flow and hidden places are not.
+const LEAST_CONFIRMED_SHARE: f64 = 0.3;
+/// Distance of the pixels that observe a group's motion, in both directions.
+const SAMPLE_STEP_PX: usize = 2;
+/// Side of the blocks that count as independent in a group's covariance, in pixels. The scene's blocks are larger; a group
+/// covers too few of those.
 const BLOCK_PX: f64 = 24.0;
-/// χ²₆(0.999): motions that differ by less are the same.
-const ALIKE: f64 = 22.46;
+/// Motions whose squared Mahalanobis distance is less than this are the same: χ²₆(0.999).
+const SAME_MOTION_CHI2: f64 = 22.46;
 /// Median of χ²₁.
 const MEDIAN_CHI2: f64 = 0.454_94;
 
@@ -79,9 +80,8 @@ impl<'a> Groups<'a> {
     pub(super) fn find(
         pair: &DensePair<'_>,
         moving: Moving,
-        config: &Config,
+        interval: &Interval<'_>,
         still: &MotionEstimate,
-        dt_s: f64,
         predict: impl Fn(&[StereoTrack], &MotionEstimate) -> Option<RigidPrediction<'a>>,
     ) -> Self {
         let surface = |cell| moving.disparity(cell);
@@ -89,7 +89,7 @@ impl<'a> Groups<'a> {
         let mut regions = moving.layout().regions(|cell| surface(cell).is_some(), joined);
         regions.retain(|region| is_believed(region, &moving));
         regions.sort_by_key(|region| Reverse(region.len()));
-        let config = &Config { block_px: BLOCK_PX, ..config.clone() };
+        let config = &Config { block_px: BLOCK_PX, ..interval.config.clone() };
         let mut groups = Self { of_cell: vec![None; moving.layout().count()], moving, bodies: Vec::new() };
         let moves = |region: &Vec<usize>| {
             let sampled = Sampled::of(pair, &groups.moving, region);
@@ -106,7 +106,9 @@ impl<'a> Groups<'a> {
                 region.extend(groups.gaps(pair, &region, rigid));
             }
             let layout = groups.moving.layout();
-            let Some(body) = sampled.body(pair.rig, layout, &region, motion, rigid, dt_s) else { continue };
+            let Some(body) = sampled.body(pair.rig, layout, &region, motion, rigid, interval.dt_s) else {
+                continue;
+            };
             region.iter().for_each(|&cell| groups.of_cell[cell] = Some(groups.bodies.len()));
             groups.bodies.push(body);
         }
@@ -188,7 +190,7 @@ impl<'a> Groups<'a> {
 fn is_believed(region: &[usize], moving: &Moving) -> bool {
     let confirmed = region.iter().filter(|&&cell| moving.is_confirmed(cell)).count();
     region.len() >= LEAST_CELLS
-        && confirmed as f64 >= LEAST_CONFIRMED * region.len() as f64
+        && confirmed as f64 >= LEAST_CONFIRMED_SHARE * region.len() as f64
         && moving.layout().enclosed(region) >= LEAST_ENCLOSED
 }
 
@@ -196,7 +198,8 @@ fn is_believed(region: &[usize], moving: &Moving) -> bool {
 fn is_still(motion: &MotionEstimate, still: &MotionEstimate) -> bool {
     let apart =
         Gaussian { mean: motion.theta.mean - still.theta.mean, cov: motion.theta.cov + still.theta.cov };
-    motion.is_complete() && apart.mahalanobis2(&Vector6::zeros()).is_some_and(|square| square < ALIKE)
+    motion.is_complete()
+        && apart.mahalanobis2(&Vector6::zeros()).is_some_and(|square| square < SAME_MOTION_CHI2)
 }
 
 impl Body<'_> {
@@ -239,9 +242,12 @@ impl Sampled {
         let bf = pair.rig.depth_disparity_product();
         for &cell in region {
             let (left, top) = moving.layout().corner(cell);
-            let rows = (top + STEP / 2..(top + side).min(height)).step_by(STEP);
-            let pixels = rows
-                .flat_map(|v| (left + STEP / 2..(left + side).min(width)).step_by(STEP).map(move |u| (u, v)));
+            let rows = (top + SAMPLE_STEP_PX / 2..(top + side).min(height)).step_by(SAMPLE_STEP_PX);
+            let pixels = rows.flat_map(|v| {
+                (left + SAMPLE_STEP_PX / 2..(left + side).min(width))
+                    .step_by(SAMPLE_STEP_PX)
+                    .map(move |u| (u, v))
+            });
             for (u, v) in pixels {
                 // A cell at the body's edge shows what is behind it as well.
                 let on_body = |d: &(f64, f64)| {
@@ -299,9 +305,7 @@ impl Sampled {
     /// Its covariance is itself estimated from few blocks: it is widened to that of Student's t with one degree of
     /// freedom fewer than blocks, which with three blocks has none.
     fn motion(&self, rig: &StereoRig, config: &Config) -> Option<MotionEstimate> {
-        let own = &config.maximum_likelihood;
-        let options = MaximumLikelihoodOptions { seed: own.seed ^ config.seed, ..*own };
-        let start = robust_start(&self.tracks, rig, None, &options).ok()?;
+        let start = robust_start(&self.tracks, rig, None, &config.seeded_likelihood()).ok()?;
         let mut found = Solver::new(rig, &start, config).likelihood(&self.tracks).ok()?;
         let layout = Blocks::over(rig, config.block_px);
         let mut blocks: Vec<usize> =

@@ -6,14 +6,14 @@ use crate::estimate::{Unsolvable, median};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::StereoTrack;
 
-/// A track moves by a motion that leads within so many pixels of where it was found.
-const FITS_PX: f64 = 1.0;
-/// A motion by which this share of the tracks moves is uncontested.
-const UNCONTESTED: f64 = 0.7;
-/// The least share of the tracks that may be all there is to see of the scene.
-const LEAST_SHARE: f64 = 0.25;
-/// Where the last motion goes on, tracks lie within so many pixels of where it leads: what a change of speed leaves.
-const GOES_ON_PX: f64 = 3.0;
+/// A track moves by a motion that leads within this many pixels of where it was found.
+const FITTING_PX: f64 = 1.0;
+/// A motion by which at least this share of the tracks moves is uncontested.
+const UNCONTESTED_SHARE: f64 = 0.7;
+/// The scene may show no more than this share of the tracks where a body fills most of the image.
+const LEAST_SCENE_SHARE: f64 = 0.25;
+/// Tracks that go on with the last motion lie within this many pixels of where it leads: what a change of speed leaves.
+const GOING_ON_PX: f64 = 3.0;
 
 /// The motion `found`, or that of the tracks which go on as `prior` says, if the former is contested and changes
 /// more. `refine` finds the motion of most of some tracks.
@@ -27,24 +27,24 @@ pub(super) fn scene_motion(
     let share = |count: usize| count as f64 / tracks.len().max(1) as f64;
     let fitting = |phi: &Twist| {
         let motion = phi.exp();
-        tracks.iter().filter(|track| error_px(track, rig, &motion) < FITS_PX).count()
+        tracks.iter().filter(|track| error_px(track, rig, &motion) < FITTING_PX).count()
     };
-    if share(fitting(&found)) >= UNCONTESTED {
+    if share(fitting(&found)) >= UNCONTESTED_SHARE {
         return found;
     }
     let (by_found, by_prior) = (found.exp(), prior.exp());
     let going_on: Vec<StereoTrack> = tracks
         .iter()
         .filter(|track| {
-            error_px(track, rig, &by_found) >= FITS_PX && error_px(track, rig, &by_prior) < GOES_ON_PX
+            error_px(track, rig, &by_found) >= FITTING_PX && error_px(track, rig, &by_prior) < GOING_ON_PX
         })
         .copied()
         .collect();
-    if share(going_on.len()) < LEAST_SHARE {
+    if share(going_on.len()) < LEAST_SCENE_SHARE {
         return found;
     }
     let Ok(other) = refine(&going_on) else { return found };
-    let goes_on = share(fitting(&other)) >= LEAST_SHARE;
+    let goes_on = share(fitting(&other)) >= LEAST_SCENE_SHARE;
     if goes_on && change_px(tracks, rig, &other, prior) < change_px(tracks, rig, &found, prior) {
         other
     } else {

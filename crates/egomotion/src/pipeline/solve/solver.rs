@@ -1,6 +1,5 @@
-//! One frame pair's observations to φ: the only place where the method is chosen.
+//! The methods on observations at hand, each with the configured estimator.
 
-use super::config::{Approach, Config, EstimatorKind, Method};
 use crate::constrain::{binocular_flow, dcce, image_flow};
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
 use crate::estimate::likelihood::maximum_likelihood::{MaximumLikelihood, maximum_likelihood};
@@ -14,57 +13,14 @@ use crate::estimate::sensor::augmented::augmented_step;
 use crate::estimate::sensor::tolerance::{SensedTrack, SensorErrors, SensorPrior, TrackSource};
 use crate::estimate::{Blocks, Fit, MotionEstimate, Row, Tolerance, Unsolvable};
 use crate::geometry::{StereoRig, Twist};
-use crate::observe::{DensePair, DepthChange, StereoFlow, StereoTrack};
+use crate::observe::{DepthChange, StereoFlow, StereoTrack};
+use crate::pipeline::config::{Config, EstimatorKind};
 use nalgebra::Matrix6;
 
-/// Where the observations of a frame pair come from.
-#[derive(Debug, Clone, Copy)]
-pub enum Observed<'a> {
-    /// Tracked corners, and what saw them.
-    Sparse(&'a [StereoTrack], TrackSource),
-    /// Dense fields, of which every `sample_step_px`-th pixel is used.
-    Dense(DensePair<'a>, &'a [StereoTrack]),
-}
-
-/// φ over `dt_s` seconds by the configured method; rows and robust weights start from `start`.
-///
-/// # Errors
-/// [`Unsolvable`] when the observations do not determine a motion.
-pub fn solve(
-    observed: &Observed<'_>,
-    rig: &StereoRig,
-    start: &Twist,
-    config: &Config,
-    dt_s: f64,
-) -> Result<MotionEstimate, Unsolvable> {
-    let solver = Solver::new(rig, start, config).over(dt_s);
-    let found = match (config.method, config.approach) {
-        (Method::Ml, Approach::Discrete) => solver.sensed(&solver.tracks(observed), observed.source()),
-        (Method::Ml, Approach::Differential) => solver.likelihood(&solver.flows(observed)),
-        (Method::Dcce, _) => solver.depth_change(&solver.depth_changes(observed)),
-        (Method::Dv, _) => solver.binocular(&solver.flows(observed)),
-        (Method::Joint, _) => solver.joint(&solver.flows(observed)),
-        (Method::Rigid, _) => solver.alignment(&solver.tracks(observed), Form::Rigid),
-        (Method::Linear22, _) => solver.alignment(&solver.tracks(observed), Form::Affine),
-    };
-    found?.known()
-}
-
-impl Observed<'_> {
-    /// What made the tracks.
-    fn source(&self) -> TrackSource {
-        match self {
-            Observed::Sparse(_, source) => *source,
-            Observed::Dense(pair, _) if pair.given => TrackSource::Image,
-            Observed::Dense(..) => TrackSource::Stereo,
-        }
-    }
-}
-
-/// The sensor's errors are looked at again so often at most,
-const ROUNDS: usize = 5;
-/// until φ moves by less than this, in its standard deviations.
-pub(super) const SETTLED: f64 = 0.1;
+/// The sensor's errors are corrected and estimated again at most this many times.
+const SENSOR_ROUNDS: usize = 5;
+/// Rounds end when φ moves by less than this, in its standard deviations: what is left is small beside its own error.
+pub(super) const SETTLED_SIGMAS: f64 = 0.1;
 
 /// The methods on observations at hand, each with the configured estimator.
 #[derive(Debug, Clone, Copy)]
@@ -83,45 +39,9 @@ impl<'a> Solver<'a> {
         Self { rig, start, config, blocks: Blocks::over(rig, config.block_px), prior: exact }
     }
 
-    /// The same for an interval of `dt_s` seconds, with the tolerance of the sensor.
-    pub fn over(self, dt_s: f64) -> Self {
+    /// The same, with the sensor's tolerance over an interval of `dt_s` seconds.
+    pub(super) fn with_tolerance(self, dt_s: f64) -> Self {
         Self { prior: self.config.tolerance.over(dt_s), ..self }
-    }
-
-    fn tracks(&self, observed: &Observed<'_>) -> Vec<StereoTrack> {
-        match observed {
-            Observed::Sparse(tracks, _) => tracks.to_vec(),
-            Observed::Dense(pair, tracks) => {
-                let mut all = pair.every(self.config.sample_step_px, DensePair::stereo_track);
-                all.extend_from_slice(tracks);
-                all
-            }
-        }
-    }
-
-    fn flows(&self, observed: &Observed<'_>) -> Vec<StereoFlow> {
-        let discrete = self.config.approach == Approach::Discrete;
-        match observed {
-            Observed::Dense(pair, _) if !discrete => {
-                pair.every(self.config.sample_step_px, DensePair::stereo_flow)
-            }
-            _ if discrete => self.tracks(observed).iter().map(StereoTrack::discrete_flow).collect(),
-            _ => self.tracks(observed).iter().map(StereoTrack::midpoint_flow).collect(),
-        }
-    }
-
-    fn depth_changes(&self, observed: &Observed<'_>) -> Vec<DepthChange> {
-        let bf = self.rig.depth_disparity_product();
-        let step = self.config.sample_step_px;
-        match (observed, self.config.approach) {
-            (Observed::Sparse(..), _) => Vec::new(),
-            (Observed::Dense(pair, _), Approach::Discrete) => {
-                pair.every(step, |pair, u, v| Some(pair.depth_track(u, v)?.depth_change(bf)))
-            }
-            (Observed::Dense(pair, _), Approach::Differential) => {
-                pair.every(step, |pair, u, v| Some(pair.depth_flow(u, v)?.depth_change(bf)))
-            }
-        }
     }
 
     /// The configured estimator on rows whose scale is as printed.
@@ -150,12 +70,12 @@ impl<'a> Solver<'a> {
         let blocks = Some(&self.blocks);
         let found = maximum_likelihood(observations, self.rig, self.start, blocks, &options.kernel)?;
         let mut motion = found.motion;
-        motion.theta.cov += self.phase(&found);
+        motion.theta.cov += self.phase_covariance(&found);
         Ok(motion)
     }
 
     /// What the phase error adds to a covariance.
-    fn phase(&self, found: &MaximumLikelihood) -> Matrix6<f64> {
+    fn phase_covariance(&self, found: &MaximumLikelihood) -> Matrix6<f64> {
         let known = found.motion.theta.cov.iter().all(|v| v.is_finite());
         let sigma_px = self.config.maximum_likelihood.phase_error_px;
         let common = found.common.filter(|_| known);
@@ -163,7 +83,11 @@ impl<'a> Solver<'a> {
     }
 
     /// Maximum likelihood of tracks that a sensor made which is known only so well.
-    fn sensed(&self, tracks: &[StereoTrack], source: TrackSource) -> Result<MotionEstimate, Unsolvable> {
+    pub(super) fn sensor_likelihood(
+        &self,
+        tracks: &[StereoTrack],
+        source: TrackSource,
+    ) -> Result<MotionEstimate, Unsolvable> {
         if self.prior.is_exact() {
             return self.likelihood(tracks);
         }
@@ -177,7 +101,7 @@ impl<'a> Solver<'a> {
             let moved = found.moved_from(&start);
             start = found.phi();
             round += 1;
-            if moved < SETTLED || round == ROUNDS {
+            if moved < SETTLED_SIGMAS || round == SENSOR_ROUNDS {
                 return Ok(found);
             }
         }
@@ -193,15 +117,15 @@ impl<'a> Solver<'a> {
         let kernel = &self.config.maximum_likelihood.kernel;
         let blocks = &self.blocks;
         let found = maximum_likelihood(&tracks, self.rig, self.start, Some(blocks), kernel)?;
-        let (phase, mut motion) = (self.phase(&found), found.motion);
-        let joint = match self.prior.is_exact() {
+        let (phase, mut motion) = (self.phase_covariance(&found), found.motion);
+        let augmented = match self.prior.is_exact() {
             true => None,
             false => augmented_step(corrected, self.rig, &found, errors, &self.prior, blocks),
         };
-        if let Some(joint) = joint {
-            motion.theta.mean += joint.step;
-            motion.theta.cov = joint.cov;
-            *errors = joint.errors;
+        if let Some(augmented) = augmented {
+            motion.theta.mean += augmented.step;
+            motion.theta.cov = augmented.cov;
+            *errors = augmented.errors;
         }
         motion.theta.cov += phase;
         Ok(motion)

@@ -1,0 +1,202 @@
+//! Frames in, motion out: keeps what one frame needs of the ones before.
+
+use super::answer::{DenseResults, FrameMotion, Unanswered};
+use super::config::{Config, Observe, PipelineError};
+use super::frame::{Frame, PreparedFrame, erase, erase_partners, sized};
+use super::frame_pair::{Compared, FramePair};
+use super::memory::{KeptFrame, Memory};
+use super::stages::{StageTimes, timed};
+use crate::geometry::{Grid, StereoRig};
+use crate::observe::flow::FlowSpace;
+use crate::observe::{DisparityMap, DisparityMatcher, FlowField, StereoPyramid};
+
+/// The memory of a [`StereoMotion`].
+pub type StereoMemory = Memory<KeptFrame>;
+
+/// Turns a sequence of stereo frames into motion.
+///
+/// Feed it one frame after the other; it keeps the last good frame and what was computed of it.
+#[derive(Debug)]
+pub struct StereoMotion {
+    rig: StereoRig,
+    config: Config,
+    matcher: DisparityMatcher,
+    mask: Option<Grid<bool>>,
+    mask_right: Option<Grid<bool>>,
+    memory: Memory<PreparedFrame>,
+    flow_space: FlowSpace,
+    /// The images of a frame that is no longer needed: the next ones take their place.
+    spare: Option<StereoPyramid>,
+}
+
+impl StereoMotion {
+    /// A pipeline for one rig.
+    ///
+    /// # Errors
+    /// [`PipelineError`] when the rig cannot measure or the choices do not fit together.
+    pub fn new(rig: StereoRig, config: Config) -> Result<Self, PipelineError> {
+        rig.check()?;
+        config.check()?;
+        Ok(Self {
+            rig,
+            matcher: DisparityMatcher::new(config.disparity.clone()),
+            config,
+            mask: None,
+            mask_right: None,
+            memory: Memory::new(),
+            flow_space: FlowSpace::default(),
+            spare: None,
+        })
+    }
+
+    /// The rig.
+    pub fn rig(&self) -> &StereoRig {
+        &self.rig
+    }
+
+    /// Pixels of the left image that are never used (a bonnet, a rotor), where `true`.
+    pub fn set_mask(&mut self, mask: Option<Grid<bool>>) {
+        self.mask = mask;
+    }
+
+    /// Pixels of the right image that show nothing (beyond a lens or the raw image), where `true`: no disparity
+    /// leads there.
+    pub fn set_right_mask(&mut self, mask: Option<Grid<bool>>) {
+        self.mask_right = mask;
+    }
+
+    /// Flow of the last frame's left image to the one that comes next: [`Frame::flow`] of whoever knows it only then.
+    ///
+    /// Nothing is done before the first frame; after a bad frame the flow is not used.
+    ///
+    /// # Errors
+    /// [`Unanswered::BadImage`] when it is not of the rig's size.
+    pub fn set_flow(&mut self, flow: FlowField) -> Result<(), Unanswered> {
+        sized("flow", flow.size(), &self.rig)?;
+        if let Some(last) = self.memory.reference_mut() {
+            last.flow = Some(flow);
+        }
+        Ok(())
+    }
+
+    /// The frame that the next one will be matched with.
+    pub fn reference(&self) -> Option<usize> {
+        self.memory.reference().map(|reference| reference.frame)
+    }
+
+    /// Account for a frame that could not be read: it gets a row, and the next frame bridges it.
+    pub fn skip(&mut self, time_s: f64, why: Unanswered) -> FrameMotion {
+        self.memory.skip(time_s, why)
+    }
+
+    /// The motion from the last good frame to this one.
+    pub fn push(&mut self, frame: impl Into<Frame>) -> FrameMotion {
+        let frame = frame.into();
+        if let Err(why) = self.usable(&frame) {
+            return self.skip(frame.time_s, why);
+        }
+        self.memory.set_time(frame.time_s);
+        let mut stages = StageTimes::default();
+        let blank = frame.is_blank();
+        let here = self.prepared(frame, self.memory.next_frame(), &mut stages);
+        let Some(before) = self.memory.take_reference() else {
+            let first = self.skip(here.time_s, Unanswered::First);
+            self.memory.set_reference(here);
+            return first;
+        };
+        if here.repeats(&before, blank) {
+            let repeated = self.skip(here.time_s, Unanswered::RepeatedFrame);
+            self.memory.set_reference(before);
+            self.spare = Some(here.images);
+            return repeated;
+        }
+        self.compare(before, here, stages)
+    }
+
+    /// The answer of two frames, and what the next one needs of them.
+    fn compare(
+        &mut self,
+        mut before: PreparedFrame,
+        here: PreparedFrame,
+        mut stages: StageTimes,
+    ) -> FrameMotion {
+        let masks = [self.mask.as_ref(), self.mask_right.as_ref()];
+        let pair = FramePair::new(&before, &here, &self.rig, &self.config, masks);
+        let expected = self.memory.expected_motion(here.time_s - before.time_s);
+        let Compared { answer, fields, corners } =
+            pair.compare(expected.as_ref(), &mut self.flow_space, &mut stages);
+        // After an answer the earlier frame is not needed again.
+        let disparity =
+            if answer.motion.is_ok() { before.disparity.take() } else { before.disparity.clone() };
+        let dense =
+            fields.zip(disparity).map(|((flow, motion), disparity)| DenseResults { disparity, flow, motion });
+        let moments = ((before.frame, before.time_s), (here.frame, here.time_s));
+        let answer = FrameMotion::of_pair(moments.0, moments.1, answer, dense, stages);
+        let gone = self.memory.remember(&answer, before, PreparedFrame { corners, ..here });
+        self.spare = Some(gone.images);
+        answer
+    }
+
+    /// What is kept of the frames so far: with it, and the frame that it names, [`StereoMotion::recall`] goes on.
+    pub fn memory(&self) -> StereoMemory {
+        self.memory.kept(|reference| KeptFrame {
+            frame: reference.frame,
+            time_s: reference.time_s,
+            corners: reference.corners.clone(),
+        })
+    }
+
+    /// Go on where a pipeline of the same rig, choices and mask had this memory: every later answer is the same,
+    /// bit for bit. `frame` gives again the one with the index that [`StereoMemory::reference_frame`] names.
+    ///
+    /// # Errors
+    /// Why that frame cannot be used; the pipeline then stays as it was.
+    pub fn recall(
+        &mut self,
+        memory: StereoMemory,
+        frame: impl FnOnce(usize) -> Result<Frame, Unanswered>,
+    ) -> Result<(), Unanswered> {
+        self.memory = memory.restored(|kept| -> Result<PreparedFrame, Unanswered> {
+            let frame = frame(kept.frame)?;
+            frame.check(&self.rig)?;
+            let prepared = self.prepared(frame, kept.frame, &mut StageTimes::default());
+            Ok(PreparedFrame { time_s: kept.time_s, corners: kept.corners, ..prepared })
+        })?;
+        Ok(())
+    }
+
+    /// A frame with all that is computed of it alone.
+    fn prepared(&mut self, frame: Frame, index: usize, stages: &mut StageTimes) -> PreparedFrame {
+        let images = timed(&mut stages.pyramids_ms, || {
+            let mut images = self.spare.take().unwrap_or_default();
+            images.renew(&frame.left, frame.right.as_ref(), self.config.tracks.pyramid_levels);
+            images
+        });
+        let disparity = timed(&mut stages.disparity_ms, || self.disparity(frame.disparity, &images));
+        let Frame { time_s, flow, .. } = frame;
+        PreparedFrame { frame: index, time_s, images, disparity, flow, corners: Vec::new() }
+    }
+
+    /// The given disparity, or that of the images when observing densely, without what is masked.
+    fn disparity(&mut self, given: Option<DisparityMap>, images: &StereoPyramid) -> Option<DisparityMap> {
+        let mut map = match (given, self.config.observe) {
+            (Some(given), _) => given,
+            (None, Observe::Sparse) => return None,
+            (None, Observe::Dense) => {
+                self.matcher.compute(images.left.levels().first()?, images.right.levels().first()?).ok()?
+            }
+        };
+        if let Some(mask) = &self.mask {
+            erase(&mut map.shift, mask);
+        }
+        if let Some(mask) = &self.mask_right {
+            erase_partners(&mut map.shift, mask);
+        }
+        Some(map)
+    }
+
+    fn usable(&self, frame: &Frame) -> Result<(), Unanswered> {
+        frame.check(&self.rig)?;
+        self.memory.check_time(frame.time_s)
+    }
+}

@@ -1,0 +1,210 @@
+//! Tracks that others made, frame by frame, to motion.
+
+use std::collections::HashMap;
+
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::answer::{FrameMotion, PairAnswer, Unanswered};
+use super::config::{Config, ConfigError, Method, Observe, PipelineError};
+use super::interpret;
+use super::memory::{Memory, TimedFrame};
+use super::plan::Interval;
+use super::solve::{Observed, first_motion, solve};
+use super::stages::{StageTimes, timed};
+use crate::estimate::median;
+use crate::estimate::sensor::tolerance::TrackSource;
+use crate::geometry::{Gaussian, StereoRig};
+use crate::observe::StereoTrack;
+
+/// Standard deviation of a tracked place until the residuals tell a better one, in pixels.
+const PLACE_SIGMA_PX: f64 = 0.5;
+/// Fewest tracks whose residuals tell their distribution; of fewer, Student's t is taken as it stands.
+const FEWEST_FITTED: usize = 200;
+
+/// A point of a track: where one frame's two images show it, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TrackPoint {
+    /// The same number for the same point in every frame.
+    pub track: u64,
+    /// (u, v) in the left image.
+    pub left: (f64, f64),
+    /// (u, v) in the right image.
+    pub right: (f64, f64),
+}
+
+impl TrackPoint {
+    fn is_finite(&self) -> bool {
+        [self.left.0, self.left.1, self.right.0, self.right.1].iter().all(|c| c.is_finite())
+    }
+}
+
+/// Turns tracks into motion: the estimation of [`super::StereoMotion`] without its images.
+///
+/// How exact the tracks are is found from their residuals. A point at exactly the places that the reference frame has
+/// for its track is a copy and no measurement: it is left out, and a frame of copies alone (or of copies and of
+/// tracks that have only begun) is no new frame ([`Unanswered::RepeatedFrame`]).
+#[derive(Debug)]
+pub struct TrackMotion {
+    rig: StereoRig,
+    config: Config,
+    memory: Memory<TrackedFrame>,
+}
+
+/// The points of one time.
+#[derive(Debug)]
+struct TrackedFrame {
+    frame: usize,
+    time_s: f64,
+    points: HashMap<u64, TrackPoint>,
+}
+
+impl TimedFrame for TrackedFrame {
+    fn moment(&self) -> (usize, f64) {
+        (self.frame, self.time_s)
+    }
+}
+
+/// What is kept of a frame of tracks.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KeptTracks {
+    frame: usize,
+    time_s: f64,
+    points: Vec<TrackPoint>,
+}
+
+/// The memory of a [`TrackMotion`].
+pub type TrackMemory = Memory<KeptTracks>;
+
+impl TrackMotion {
+    /// A pipeline for one rig; [`Config::observe`] has no meaning here.
+    ///
+    /// # Errors
+    /// [`PipelineError`] when the rig cannot measure or the choices do not fit together.
+    pub fn new(rig: StereoRig, config: Config) -> Result<Self, PipelineError> {
+        rig.check()?;
+        config.check()?;
+        if config.method == Method::Dcce {
+            return Err(ConfigError::SparseDepthChange.into());
+        }
+        let config = Config { observe: Observe::Sparse, ..config };
+        Ok(Self { rig, config, memory: Memory::new() })
+    }
+
+    /// The frame that the next one will be compared with.
+    pub fn reference(&self) -> Option<usize> {
+        self.memory.reference().map(|reference| reference.frame)
+    }
+
+    /// What is kept of the frames so far: with it [`TrackMotion::recall`] goes on.
+    pub fn memory(&self) -> TrackMemory {
+        self.memory.kept(|reference| KeptTracks {
+            frame: reference.frame,
+            time_s: reference.time_s,
+            points: reference.points.values().copied().collect(),
+        })
+    }
+
+    /// Go on where a pipeline of the same rig and choices had this memory: every later answer is the same.
+    pub fn recall(&mut self, memory: TrackMemory) {
+        self.memory = memory.map(|KeptTracks { frame, time_s, points }| {
+            let points = points.into_iter().map(|point| (point.track, point)).collect();
+            TrackedFrame { frame, time_s, points }
+        });
+    }
+
+    /// Account for a frame that could not be read.
+    pub fn skip(&mut self, time_s: f64, why: Unanswered) -> FrameMotion {
+        self.memory.skip(time_s, why)
+    }
+
+    /// The motion from the last good frame to this one, from the tracks that both have.
+    pub fn push(&mut self, time_s: f64, points: &[TrackPoint]) -> FrameMotion {
+        if let Err(why) = self.memory.check_time(time_s) {
+            return self.skip(time_s, why);
+        }
+        self.memory.set_time(time_s);
+        let points = points.iter().filter(|p| p.is_finite()).map(|point| (point.track, *point)).collect();
+        let mut here = TrackedFrame { frame: self.memory.next_frame(), time_s, points };
+        let Some(before) = self.memory.take_reference() else {
+            let first = self.skip(time_s, Unanswered::First);
+            self.memory.set_reference(here);
+            return first;
+        };
+        if here.forget_copies(&before) {
+            let (reference, time_s) = (before.moment(), here.time_s);
+            // New tracks tell of a time that the old ones do not reach: the motion up to it is lost.
+            self.memory.set_reference(if here.points.is_empty() { before } else { here });
+            return self.memory.count_unanswered(time_s, Some(reference), Unanswered::RepeatedFrame);
+        }
+        self.compare(before, here)
+    }
+
+    /// The answer of two frames, and what the next one needs of them.
+    fn compare(&mut self, before: TrackedFrame, after: TrackedFrame) -> FrameMotion {
+        let mut stages = StageTimes::default();
+        let dt_s = after.time_s - before.time_s;
+        let expected = self.memory.expected_motion(dt_s);
+        let pairs = before.pairs(&after);
+        let tracks: Vec<StereoTrack> = pairs
+            .iter()
+            .map(|(a, b)| StereoTrack { before: self.located(a), after: self.located(b) })
+            .filter(|track| track.before.mean.z > 0.0 && track.after.mean.z > 0.0)
+            .collect();
+        let mut rows: Vec<f64> = pairs.iter().map(|(a, _)| a.right.1 - a.left.1).collect();
+        let rows = Some(median(&mut rows).abs()).filter(|rows| rows.is_finite());
+        let mut config = self.config.clone();
+        config.maximum_likelihood.kernel.fitted &= tracks.len() >= FEWEST_FITTED;
+        let interval = Interval::new(&self.rig, &config, TrackSource::Stereo, dt_s);
+        let start = first_motion(&tracks, &interval, expected.as_ref());
+        let motion =
+            timed(&mut stages.estimate_ms, || solve(&Observed::Tracks(&tracks), &interval, Some(&start?)));
+        let obstacle = interpret::tracks(&tracks, motion.as_ref().ok(), rows, &interval);
+        let motion = motion.map_err(Unanswered::from);
+        let answer = PairAnswer { motion, row_disagreement_px: rows, obstacle, moving: Vec::new() };
+        let answer = FrameMotion::of_pair(before.moment(), after.moment(), answer, None, stages);
+        self.memory.remember(&answer, before, after);
+        answer
+    }
+
+    /// (x, y, d): v is the mean of both images', and u is that of the left one.
+    fn located(&self, point: &TrackPoint) -> Gaussian<3> {
+        let v = 0.5 * (point.left.1 + point.right.1);
+        let (x, y) = self.rig.image_from_pixel(point.left.0, v);
+        let d = self.rig.disparity_from_shift(point.left.0 - point.right.0);
+        let (variance, aspect) = (PLACE_SIGMA_PX * PLACE_SIGMA_PX, self.rig.aspect());
+        // d = u_left − u_right shares the left one's error.
+        let cov = Matrix3::new(
+            variance,
+            0.0,
+            variance, //
+            0.0,
+            0.5 * variance * aspect * aspect,
+            0.0, //
+            variance,
+            0.0,
+            2.0 * variance,
+        );
+        Gaussian { mean: Vector3::new(x, y, d), cov }
+    }
+}
+
+impl TrackedFrame {
+    /// Leave out the points that are copies of an earlier frame's; whether no shared track is left by that.
+    fn forget_copies(&mut self, before: &Self) -> bool {
+        let shared =
+            |here: &Self| here.points.keys().filter(|track| before.points.contains_key(track)).count();
+        let all = shared(self);
+        self.points.retain(|track, point| before.points.get(track) != Some(point));
+        all > 0 && shared(self) == 0
+    }
+
+    /// The points of the tracks that a later frame has too, in the order of the tracks' numbers: that of a hash map is
+    /// not the same twice.
+    fn pairs<'a>(&'a self, after: &'a Self) -> Vec<(&'a TrackPoint, &'a TrackPoint)> {
+        let shared = |(track, point)| Some((point, after.points.get(track)?));
+        let mut pairs: Vec<(&TrackPoint, &TrackPoint)> = self.points.iter().filter_map(shared).collect();
+        pairs.sort_by_key(|(point, _)| point.track);
+        pairs
+    }
+}
