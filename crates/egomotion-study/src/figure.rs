@@ -31,9 +31,9 @@ pub struct Panel {
 pub enum Content {
     /// Lines over two axes.
     Plot {
-        /// To the right.
+        /// The axis to the right.
         x: Axis,
-        /// Upwards.
+        /// The axis upwards.
         y: Axis,
         /// The lines, drawn in this order and named in the legend.
         series: Vec<Series>,
@@ -104,6 +104,30 @@ pub struct Point {
     pub y: f64,
     /// Standard error of y, drawn as a bar of ± 2.
     pub standard_error: Option<f64>,
+}
+
+impl Figure {
+    /// Whether a panel of it has a line to show.
+    pub(crate) fn has_a_line(&self) -> bool {
+        let drawn =
+            |panel: &Panel| matches!(&panel.content, Content::Plot { series, .. } if !series.is_empty());
+        self.panels.iter().any(drawn)
+    }
+}
+
+impl Series {
+    /// A line through points without standard errors.
+    pub(crate) fn through(name: &str, line: Line, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let points = points.into_iter().map(|(x, y)| Point::at(x, y)).collect();
+        Self { name: name.to_owned(), line, points }
+    }
+}
+
+impl Point {
+    /// A point without a standard error.
+    pub(crate) fn at(x: f64, y: f64) -> Self {
+        Self { x, y, standard_error: None }
+    }
 }
 
 impl Axis {

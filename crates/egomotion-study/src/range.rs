@@ -20,12 +20,12 @@ pub struct OutOfRange {
 }
 
 /// Draws, poses, pairs: a study of more would never end.
-pub(super) const COUNTS: RangeInclusive<usize> = 1..=100_000_000;
+pub(crate) const COUNTS: RangeInclusive<usize> = 1..=100_000_000;
 /// Pixels of an image in one direction.
 const PIXELS: RangeInclusive<usize> = 16..=8192;
 
 /// Nothing if the value lies in the range; NaN lies in none.
-pub(super) fn within<T: PartialOrd + Display + Debug>(
+pub(crate) fn within<T: PartialOrd + Display + Debug>(
     name: &'static str,
     value: T,
     range: &RangeInclusive<T>,
@@ -38,13 +38,13 @@ pub(super) fn within<T: PartialOrd + Display + Debug>(
 }
 
 /// Nothing if the image has a size that can be rendered.
-pub(super) fn size(width_px: usize, height_px: usize) -> Result<(), OutOfRange> {
+pub(crate) fn size(width_px: usize, height_px: usize) -> Result<(), OutOfRange> {
     within("the width in pixels", width_px, &PIXELS)?;
     within("the height in pixels", height_px, &PIXELS)
 }
 
 /// Nothing if all are names of rendered sequences.
-pub(super) fn sequences<'a>(names: impl IntoIterator<Item = &'a String>) -> Result<(), OutOfRange> {
+pub(crate) fn sequences<'a>(names: impl IntoIterator<Item = &'a String>) -> Result<(), OutOfRange> {
     let unknown = names.into_iter().find(|name| !Sequence::names().any(|known| known == name.as_str()));
     let wanted = || format!("one of {}", Sequence::names().collect::<Vec<_>>().join(", "));
     unknown.map_or(Ok(()), |name| Err(OutOfRange { name: "sequence", value: name.clone(), wanted: wanted() }))
