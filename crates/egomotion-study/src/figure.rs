@@ -7,9 +7,9 @@ use egomotion::geometry::{Field, Image};
 pub struct Figure {
     /// Stem of its file's name: `figure-07`.
     pub id: String,
-    /// What it shows, with the paper's number where it is one of the paper's: `Figure 7. Error of VZ …`.
+    /// Its title, with the paper's number where it is one of the paper's: `Figure 7. Error of VZ …`.
     pub title: String,
-    /// What to see in it, in a sentence or two.
+    /// A sentence or two on how to read it.
     pub caption: String,
     /// Panels in a row.
     pub columns: usize,
@@ -22,11 +22,11 @@ pub struct Figure {
 pub struct Panel {
     /// Its heading, as `(a) disparity resolution`.
     pub title: String,
-    /// What it holds.
+    /// Its content.
     pub content: Content,
 }
 
-/// What a panel holds.
+/// The content of a panel.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Content {
     /// Lines over two axes.

@@ -12,7 +12,7 @@ use crate::table::Table;
 /// A part gives the same records on any number of threads, whichever parts ran before it. So a study can be stopped
 /// after any part and resumed, and its parts can run on several machines.
 pub trait Study: Serialize + Sync {
-    /// What one part finds: values that can be written to a file and read back.
+    /// A finding of a part: a value that can be written to a file and read back.
     type Record: Serialize + DeserializeOwned + Clone + Send;
     /// Why a part may fail.
     type Error: std::error::Error + Send + Sync + 'static;
@@ -34,7 +34,7 @@ pub trait Study: Serialize + Sync {
     /// Run the part of that index in [`Study::parts`].
     ///
     /// # Errors
-    /// Whatever keeps the part from being run, such as an unknown sequence or a file that cannot be read.
+    /// The cause, such as an unknown sequence or a file that cannot be read.
     fn run(&self, part: usize) -> Result<Vec<Self::Record>, Self::Error>;
 
     /// Tables and figures of the records so far, in the order of the parts; some parts may be missing.
@@ -44,7 +44,7 @@ pub trait Study: Serialize + Sync {
 /// The tables and figures of a study.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Publication {
-    /// One line that says what it is.
+    /// The title, one line.
     pub title: String,
     /// Full results, for files only.
     pub data: Vec<Table>,

@@ -28,7 +28,7 @@ impl Default for Assumptions {
     }
 }
 
-/// What a part finds.
+/// A finding of one part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum AssumptionRecord {
     /// φ from depth and from brightness.

@@ -153,7 +153,7 @@ impl<'a> ErringDepthCamera<'a> {
     }
 }
 
-/// Where the cyclopean camera is: from time 0 to 1 the scene moves by φ, faster in the end.
+/// The path of the cyclopean camera: from time 0 to 1 the scene moves by φ, faster in the end.
 struct Path {
     pose: RigidMotion,
     phi: Twist,

@@ -14,7 +14,7 @@ const COLUMNS: [(&str, &str); 17] = [
     ("pairs", "pairs"),
     ("answered", "answered"),
     ("nees_over_6", "NEES/6"),
-    ("beyond_chi2_99_percent", "beyond χ²₆(.99) (%)"),
+    ("beyond_chi2_99_percent", "beyond χ²₆(0.99) (%)"),
     ("t_rmse_mm", "translation (mm)"),
     ("r_rmse_deg", "rotation (°)"),
     ("vz_coverage_95_percent", "VZ in its 95 % (%)"),

@@ -105,7 +105,7 @@ impl DegenerateScene {
         Self { name, planes, motion: ALL_BUT_ROLL, rows: None, points: POINTS }
     }
 
-    /// What each of `contenders` reports as observed, over so many draws.
+    /// The counts of each of `contenders`, over so many draws.
     pub fn observed(&self, contenders: &[Contender], draws: usize, seed: u64) -> Vec<ObservedCounts> {
         let Some(rig) = paper_rig(SIZE_PX) else { return Vec::new() };
         let truth = twist_from_mm_deg(&self.motion);

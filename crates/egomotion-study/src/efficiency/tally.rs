@@ -58,12 +58,12 @@ pub struct EfficiencyStatistics {
 
 impl EfficiencyTally {
     /// One draw without an answer.
-    pub fn refusal() -> Self {
+    pub(super) fn refusal() -> Self {
         Self { refused: 1, ..Self::default() }
     }
 
     /// One draw: an estimate beside the efficient one, whose covariance is the bound.
-    pub fn of(estimate: &MotionEstimate, efficient: &Gaussian<6>, truth: &Twist) -> Self {
+    pub(super) fn of(estimate: &MotionEstimate, efficient: &Gaussian<6>, truth: &Twist) -> Self {
         let truth = truth.vector();
         let error = estimate.theta.mean - truth;
         let bound: Vector6<f64> = efficient.cov.diagonal().map(f64::sqrt);
@@ -90,7 +90,7 @@ impl EfficiencyTally {
     }
 
     /// These draws and others.
-    pub fn merged(mut self, other: &Self) -> Self {
+    pub(super) fn merged(mut self, other: &Self) -> Self {
         self.draws += other.draws;
         self.refused += other.refused;
         self.nees_draws += other.nees_draws;

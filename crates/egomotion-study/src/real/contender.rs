@@ -40,7 +40,7 @@ impl ImageContender {
     }
 
     /// Names of approach, method and estimator in a file.
-    pub fn names(&self) -> [&'static str; 3] {
+    pub(super) fn names(&self) -> [&'static str; 3] {
         let estimator = match self.estimator {
             // It stands with least squares.
             ImageEstimator::Pixel | ImageEstimator::Ls => "ls",
@@ -51,7 +51,7 @@ impl ImageContender {
     }
 
     /// Name on a page: `DCCE, LS`.
-    pub fn label(&self) -> &'static str {
+    pub(super) fn label(&self) -> &'static str {
         match (self.method, self.estimator) {
             (Method::Dcce, ImageEstimator::Lmeds) => "DCCE, LMedS",
             (Method::Dcce, _) => "DCCE, LS",

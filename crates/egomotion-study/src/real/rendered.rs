@@ -59,7 +59,7 @@ impl RenderedSequence {
         })
     }
 
-    /// What is true at a reference pose.
+    /// The truth at a reference pose.
     pub(super) fn truth(&self, k: i32) -> PixelTruth {
         let Sequence { scene, rig, .. } = &self.sequence;
         let world = SyntheticWorld::new(scene, rig, &self.phi, k, self.step.into());

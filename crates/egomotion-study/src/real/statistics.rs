@@ -28,7 +28,7 @@ pub(super) struct PooledStatistics {
 }
 
 impl PooledStatistics {
-    /// Of the records that `chosen` picks; `None` if it picks none.
+    /// The statistics of the records that `chosen` picks; `None` if it picks none.
     pub(super) fn of(records: &[RealRecord], chosen: impl Fn(&RealRecord) -> bool) -> Option<Self> {
         let records: Vec<&RealRecord> = records.iter().filter(|record| chosen(record)).collect();
         let all = |value: fn(&RealRecord) -> f64| moments(records.iter().map(|record| value(record)));
@@ -88,7 +88,7 @@ mod tests {
         let pooled = PooledStatistics::of(&records, |_| true).unwrap();
         assert_eq!((pooled.estimate, pooled.truth, pooled.eam, pooled.n), (-0.5, -2.0, 1.5, 2));
         assert_eq!((pooled.erm_signed, pooled.erm_abs), (Some(-75.0), Some(75.0)));
-        // Variance .5 inside each draw and 2 between them; 1 mm is 50 % of the truth.
+        // Variance 0.5 inside each draw and 2 between them; 1 mm is 50 % of the truth.
         assert!((pooled.std - 2.5f64.sqrt()).abs() < 1e-12);
         assert!((pooled.std_percent.unwrap() - 50.0 * 2.5f64.sqrt()).abs() < 1e-9);
         assert!((pooled.standard_error.unwrap() - 50.0).abs() < 1e-9);

@@ -32,7 +32,7 @@ impl Setting<'_> {
     /// Least distance from the rig's centre to a surface at t − 1, t and t + 1 of every pose, in metres.
     ///
     /// Negative where it has left the room or entered a part.
-    pub fn clearance_m(&self) -> f64 {
+    pub(super) fn clearance_m(&self) -> f64 {
         let Some(phi) = self.sequence.phi_cyclopean(0) else { return f64::INFINITY };
         let moved = phi.scaled(self.step).exp();
         let at = |pose: i32| {

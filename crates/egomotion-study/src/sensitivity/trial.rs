@@ -170,7 +170,7 @@ fn vz_by_phi(p: &Vector3<f64>) -> RowVector6<f64> {
     RigidMotion::point_jacobian(p).row(2).into_owned()
 }
 
-/// Where weighted rows and iterations start: binocular flow by least squares, or no motion.
+/// The motion at which rows are weighted and iterations start: binocular flow by least squares, or none.
 fn start(contenders: &[Contender], solve: impl Fn(&Contender) -> Option<MotionEstimate>) -> Twist {
     let plain = |c: &&Contender| c.method == Method::Dv && c.estimator == EstimatorKind::Ls;
     let found = contenders.iter().find(plain).and_then(solve).filter(MotionEstimate::is_complete);

@@ -16,16 +16,16 @@ use egomotion::pipeline::Approach;
 /// finite and changes no answer that has noise.
 const LEAST_SIGMA_PX: f64 = 1e-4;
 
-/// One draw: pixels of the world, and what was measured at each.
+/// One draw: pixels of the world, and the measurements at each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw<'a, Change, Motion> {
     /// The truth of each pixel.
     pub pixels: Vec<&'a UsablePixel>,
-    /// What the depth change constraint takes.
+    /// Measurements for the depth change constraint.
     pub changes: Vec<Change>,
-    /// What binocular flow takes.
+    /// Measurements for binocular flow.
     pub motions: Vec<Motion>,
-    /// All that was measured, which is what maximum likelihood takes.
+    /// All measurements, for maximum likelihood.
     pub complete: Vec<Motion>,
 }
 

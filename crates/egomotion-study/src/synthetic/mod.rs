@@ -12,7 +12,8 @@ pub use contender::Contender;
 pub(crate) use contender::{APPROACHES, approach_name, method_name};
 pub use draw::{DifferentialDraw, DiscreteDraw, Draw};
 pub use measurement::{LEAST_FEATURES, MeasurementModel};
-pub use world::{FrameTime, SyntheticWorld, UsablePixel};
+pub(crate) use world::FrameTime;
+pub use world::{SyntheticWorld, UsablePixel};
 
 /// Reference poses exp(k φ) that the draws of a study go through in turn (7.1).
 pub const REFERENCE_POSES: [i32; 5] = [-2, -1, 0, 1, 2];

@@ -74,7 +74,7 @@ pub struct SyntheticWorld {
 
 /// Which of the three frames around t.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FrameTime {
+pub(crate) enum FrameTime {
     /// One interval before.
     Before,
     /// At t.

@@ -1,5 +1,4 @@
-//! The variance formulas of section 5, each with the estimator that it speaks of and the inputs that this
-//! estimator meets.
+//! The variance formulas of section 5, each with its estimator and the noisy inputs of this estimator.
 
 use nalgebra::{Vector2, Vector4};
 use serde::{Deserialize, Serialize};
@@ -58,7 +57,7 @@ type Function = Box<dyn Fn(&[f64]) -> f64 + Send + Sync>;
 
 /// One estimator at one point, with its noise and the variances predicted for it.
 pub(super) struct Experiment {
-    /// What is estimated: `Z`, `Zx`, `VZ`, …
+    /// The quantity that is estimated: `Z`, `Zx`, `VZ`, …
     pub quantity: &'static str,
     /// The inputs that are drawn.
     pub inputs: Inputs,
@@ -127,7 +126,7 @@ fn experiment(
         .iter()
         .map(|&(formula, kind, variance)| (formula, kind, MM2_PER_M2 * variance))
         .collect();
-    // Second order belongs to what the inputs are, so it has no formula of its own.
+    // Second order belongs to the inputs, so it has no formula of its own.
     let formula = variances_m2.last().map_or("", |last| last.0);
     predictions.push((formula, FormulaKind::SecondOrder, noisy.second_order()));
     Experiment { quantity, inputs, noisy, predictions }

@@ -64,7 +64,7 @@ pub enum UncertaintyError {
     Part(usize),
 }
 
-/// What a part finds.
+/// A finding of one part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum UncertaintyRecord {
     /// A formula against draws.

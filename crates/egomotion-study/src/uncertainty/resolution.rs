@@ -1,4 +1,4 @@
-//! What a step of disparity can show of depth: the table under (51), and Figure 3.
+//! The resolution in depth of a step of disparity: the table under (51), and Figure 3.
 
 use crate::{Axis, Content, Figure, Line, Panel, Point, Series, Table};
 use egomotion::motion::depth_velocity::smallest_change;

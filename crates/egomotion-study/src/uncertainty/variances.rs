@@ -239,7 +239,7 @@ pub(super) fn figure(cases: &[&VarianceCase]) -> Figure {
     }
 }
 
-/// What (39c) and (47c) leave out: the excess of the empirical variance against the product of noises.
+/// The product of noises that (39c) and (47c) leave out, against the excess of the empirical variance.
 pub(super) fn product_figure(cases: &[&VarianceCase]) -> Figure {
     let mut found: [Vec<(&VarianceCase, f64)>; 2] = Default::default();
     for pair in cases.windows(2) {

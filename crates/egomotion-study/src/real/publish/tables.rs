@@ -166,7 +166,7 @@ fn phi(
     table
 }
 
-/// The truth and what the paper prints for one sequence.
+/// The truth and the paper's values of one sequence.
 fn printed_rows(letter: &str, approach: Approach) -> Vec<(&'static str, MmDeg)> {
     let mut rows = Vec::new();
     let sequence = two_frames(&lab_name(letter));
