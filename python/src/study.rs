@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use egomotion_study::{
-    Assumptions, Cell, Consistency, Efficiency, LabStudy, OneSetting, Publication, Sensitivity, Study as Parts, Table,
-    Uncertainty,
+    Assumptions, Cell, Consistency, Efficiency, LabStudy, OneSetting, Publication, Sensitivity,
+    Study as Parts, Table, Uncertainty,
 };
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
