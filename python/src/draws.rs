@@ -6,10 +6,8 @@ use std::sync::{Arc, Mutex};
 use egomotion::geometry::{StereoRig, Twist};
 use egomotion::pipeline::Approach;
 use egomotion::sim;
-use egomotion_study::draw;
-use egomotion_study::sensitivity::OneSetting;
-use egomotion_study::sensitivity::setting::POSES;
-use egomotion_study::world::World;
+use egomotion_study::OneSetting;
+use egomotion_study::synthetic::{DifferentialDraw, DiscreteDraw, REFERENCE_POSES, SyntheticWorld};
 use nalgebra::Vector3;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -84,7 +82,7 @@ pub struct Draws {
     sequence: sim::Sequence,
     approach: Approach,
     /// The worlds of the reference poses, once they are needed.
-    worlds: Mutex<[Option<Arc<World>>; POSES.len()]>,
+    worlds: Mutex<[Option<Arc<SyntheticWorld>>; REFERENCE_POSES.len()]>,
     next: AtomicUsize,
 }
 
@@ -109,18 +107,18 @@ pub fn draws(py: Python<'_>, approach: &str, settings: Option<&Bound<'_, PyDict>
 }
 
 impl Draws {
-    fn world(&self, i: usize) -> Option<Arc<World>> {
+    fn world(&self, i: usize) -> Option<Arc<SyntheticWorld>> {
         // A thread that panicked leaves worlds as they are: whole or none.
         let mut worlds = self.worlds.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let place = &mut worlds[i % POSES.len()];
+        let place = &mut worlds[i % REFERENCE_POSES.len()];
         if place.is_none() {
             *place = self.study.of(&self.sequence).world(i).map(Arc::new);
         }
         place.clone()
     }
 
-    fn differential(&self, py: Python<'_>, world: &World, seed: u64) -> PyResult<Draw> {
-        let found = py.detach(|| draw::differential(world, &self.study.measuring, seed));
+    fn differential(&self, py: Python<'_>, world: &SyntheticWorld, seed: u64) -> PyResult<Draw> {
+        let found = py.detach(|| DifferentialDraw::new(world, &self.study.model, seed));
         Ok(Draw {
             rig: world.rig,
             phi: world.phi,
@@ -133,9 +131,9 @@ impl Draws {
         })
     }
 
-    fn discrete(&self, py: Python<'_>, world: &World, seed: u64) -> PyResult<Draw> {
-        let found = py.detach(|| draw::discrete(world, &self.study.measuring, seed));
-        let exact = found.exact(&self.study.measuring);
+    fn discrete(&self, py: Python<'_>, world: &SyntheticWorld, seed: u64) -> PyResult<Draw> {
+        let found = py.detach(|| DiscreteDraw::new(world, &self.study.model, seed));
+        let exact = found.exact(&self.study.model);
         Ok(Draw {
             rig: world.rig,
             phi: world.phi,

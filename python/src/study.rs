@@ -2,13 +2,10 @@
 
 use std::sync::Arc;
 
-use egomotion_study::assumptions::Assumptions;
-use egomotion_study::consistency::Consistency;
-use egomotion_study::efficiency::Efficiency;
-use egomotion_study::real::LabStudy;
-use egomotion_study::sensitivity::{OneSetting, Sensitivity};
-use egomotion_study::uncertainty::Uncertainty;
-use egomotion_study::{Cell, Publication, Study as Parts, Table};
+use egomotion_study::{
+    Assumptions, Cell, Consistency, Efficiency, LabStudy, OneSetting, Publication, Sensitivity,
+    Study as Parts, Table, Uncertainty,
+};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

@@ -7,9 +7,9 @@ use egomotion::geometry::{Field, Image};
 pub struct Figure {
     /// Stem of its file's name: `figure-07`.
     pub id: String,
-    /// What it shows, with the paper's number where it is one of the paper's: `Figure 7. Error of VZ …`.
+    /// Its title, with the paper's number where it is one of the paper's: `Figure 7. Error of VZ …`.
     pub title: String,
-    /// What to see in it, in a sentence or two.
+    /// A sentence or two on how to read it.
     pub caption: String,
     /// Panels in a row.
     pub columns: usize,
@@ -22,18 +22,18 @@ pub struct Figure {
 pub struct Panel {
     /// Its heading, as `(a) disparity resolution`.
     pub title: String,
-    /// What it holds.
+    /// Its content.
     pub content: Content,
 }
 
-/// What a panel holds.
+/// The content of a panel.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Content {
     /// Lines over two axes.
     Plot {
-        /// To the right.
+        /// The axis to the right.
         x: Axis,
-        /// Upwards.
+        /// The axis upwards.
         y: Axis,
         /// The lines, drawn in this order and named in the legend.
         series: Vec<Series>,
@@ -104,6 +104,30 @@ pub struct Point {
     pub y: f64,
     /// Standard error of y, drawn as a bar of ± 2.
     pub standard_error: Option<f64>,
+}
+
+impl Figure {
+    /// Whether a panel of it has a line to show.
+    pub(crate) fn has_a_line(&self) -> bool {
+        let drawn =
+            |panel: &Panel| matches!(&panel.content, Content::Plot { series, .. } if !series.is_empty());
+        self.panels.iter().any(drawn)
+    }
+}
+
+impl Series {
+    /// A line through points without standard errors.
+    pub(crate) fn through(name: &str, line: Line, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let points = points.into_iter().map(|(x, y)| Point::at(x, y)).collect();
+        Self { name: name.to_owned(), line, points }
+    }
+}
+
+impl Point {
+    /// A point without a standard error.
+    pub(crate) fn at(x: f64, y: f64) -> Self {
+        Self { x, y, standard_error: None }
+    }
 }
 
 impl Axis {

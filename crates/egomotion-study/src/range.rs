@@ -1,4 +1,4 @@
-//! What the settings of a study may be.
+//! The values that the settings of a study may have.
 
 use std::fmt::{Debug, Display};
 use std::ops::RangeInclusive;
@@ -11,21 +11,21 @@ use egomotion::sim::Sequence;
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("{name} is {value}; give {wanted}")]
 pub struct OutOfRange {
-    /// The setting.
+    /// Name of the setting.
     pub name: &'static str,
-    /// What it is.
+    /// Its value.
     pub value: String,
-    /// What it may be.
+    /// The values that it may have.
     pub wanted: String,
 }
 
-/// Draws, poses, pairs: a study of more would never end.
-pub(super) const COUNTS: RangeInclusive<usize> = 1..=100_000_000;
-/// Pixels of an image in one direction.
+/// Numbers of draws, places or pairs that a study takes; one of more would never end.
+pub(crate) const COUNTS: RangeInclusive<usize> = 1..=100_000_000;
+/// Widths and heights of an image that a study takes, in pixels: room for a stencil, and no more than memory holds.
 const PIXELS: RangeInclusive<usize> = 16..=8192;
 
-/// Nothing if the value lies in the range; NaN lies in none.
-pub(super) fn within<T: PartialOrd + Display + Debug>(
+/// Check that the value lies in the range; NaN lies in none.
+pub(crate) fn within<T: PartialOrd + Display + Debug>(
     name: &'static str,
     value: T,
     range: &RangeInclusive<T>,
@@ -37,14 +37,14 @@ pub(super) fn within<T: PartialOrd + Display + Debug>(
     Err(OutOfRange { name, value: format!("{value:?}"), wanted })
 }
 
-/// Nothing if the image has a size that can be rendered.
-pub(super) fn size(width_px: usize, height_px: usize) -> Result<(), OutOfRange> {
+/// Check that the image has a size that can be rendered.
+pub(crate) fn size(width_px: usize, height_px: usize) -> Result<(), OutOfRange> {
     within("the width in pixels", width_px, &PIXELS)?;
     within("the height in pixels", height_px, &PIXELS)
 }
 
-/// Nothing if all are names of rendered sequences.
-pub(super) fn sequences<'a>(names: impl IntoIterator<Item = &'a String>) -> Result<(), OutOfRange> {
+/// Check that all are names of rendered sequences.
+pub(crate) fn sequences<'a>(names: impl IntoIterator<Item = &'a String>) -> Result<(), OutOfRange> {
     let unknown = names.into_iter().find(|name| !Sequence::names().any(|known| known == name.as_str()));
     let wanted = || format!("one of {}", Sequence::names().collect::<Vec<_>>().join(", "));
     unknown.map_or(Ok(()), |name| Err(OutOfRange { name: "sequence", value: name.clone(), wanted: wanted() }))

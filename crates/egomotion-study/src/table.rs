@@ -5,9 +5,9 @@
 pub struct Table {
     /// Stem of its file's name: `table-03`.
     pub id: String,
-    /// What it shows, with the paper's number where it is one of the paper's.
+    /// Its title, with the paper's number where it is one of the paper's.
     pub title: String,
-    /// What to see in it, in a sentence or two.
+    /// A sentence or two on how to read it.
     pub caption: String,
     /// The columns.
     pub columns: Vec<Column>,

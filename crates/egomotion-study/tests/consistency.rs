@@ -1,8 +1,8 @@
 //! The study that judges the stated uncertainty: what it gives does not depend on threads, and has its columns.
 
 use egomotion::pipeline::Observe;
-use egomotion_study::Study;
-use egomotion_study::consistency::{Consistency, DepthKind, Record, RenderedSensor};
+use egomotion_study::consistency::{ConsistencyRecord, DepthKind, RenderedSensor};
+use egomotion_study::{Consistency, Study};
 use nalgebra::{SMatrix, SVector};
 
 fn small() -> Consistency {
@@ -42,7 +42,7 @@ fn every_sequence_has_a_row_and_all_have_one() {
 }
 
 /// eᵀ Σ⁻¹ e / 6 of a pair.
-fn nees_over_6(record: &Record) -> f64 {
+fn nees_over_6(record: &ConsistencyRecord) -> f64 {
     let error = SVector::<f64, 6>::from(record.error.unwrap());
     let cov = SMatrix::<f64, 6, 6>::from_column_slice(&record.cov);
     error.dot(&cov.cholesky().unwrap().solve(&error)) / 6.0
@@ -60,7 +60,7 @@ fn depth_cameras_with_rolling_shutters_know_how_wrong_they_are() {
         };
         let records: Vec<_> = (0..study.parts().len()).flat_map(|part| study.run(part).unwrap()).collect();
         let nees = records.iter().map(nees_over_6).sum::<f64>() / records.len() as f64;
-        let turned = |r: &Record| r.error.unwrap()[3..].iter().map(|e| e * e).sum::<f64>();
+        let turned = |r: &ConsistencyRecord| r.error.unwrap()[3..].iter().map(|e| e * e).sum::<f64>();
         let rms = (records.iter().map(turned).sum::<f64>() / records.len() as f64).sqrt().to_degrees();
         println!("{kind:?}: NEES/6 {nees:.2}, {rms:.4} degrees");
         // χ² exceeds twice its 48 degrees of freedom in one of 20,000 draws.

@@ -5,48 +5,55 @@
 
 use egomotion::pipeline::{Approach, Method};
 use egomotion::sim::Sequence;
-use egomotion_study::contender::Contender;
-use egomotion_study::efficiency::setting::{Ends, Kind, Place, Score, Setting};
-use egomotion_study::efficiency::tally::Figures;
-use egomotion_study::efficiency::{COMPONENTS, Efficiency};
-use egomotion_study::{Cell, Study};
+use egomotion_study::efficiency::{
+    ContenderErrors, EfficiencyStatistics, Ends, Factors, OutlierKind, PosePoints, SCENES,
+};
+use egomotion_study::synthetic::Contender;
+use egomotion_study::{Cell, Efficiency, Study};
 
-const SETTING: Setting =
-    Setting { noise_px: 0.125, ends: Ends::Both, points: 512, outliers: 0.0, kind: Kind::Uniform };
+const COMPONENTS: [&str; 6] = ["tx", "ty", "tz", "wx", "wy", "wz"];
 
-fn places(sequence: &str) -> Vec<Place> {
-    Place::of(&Sequence::named(sequence, None, Some(2), 1.0).unwrap())
+const FACTORS: Factors = Factors {
+    noise_px: 0.125,
+    ends: Ends::Both,
+    points: 512,
+    outliers: 0.0,
+    outlier_kind: OutlierKind::Uniform,
+};
+
+fn poses(sequence: &str) -> Vec<PosePoints> {
+    PosePoints::of(&Sequence::named(sequence, None, Some(2), 1.0).unwrap())
 }
 
 /// Maximum likelihood in both approaches.
-fn scores(places: &[Place], setting: &Setting, draws: usize) -> Vec<Score> {
+fn errors(poses: &[PosePoints], factors: &Factors, draws: usize) -> Vec<ContenderErrors> {
     let all = [Approach::Differential, Approach::Discrete].into_iter().flat_map(Contender::all);
     let contenders: Vec<Contender> = all.filter(|contender| contender.method == Method::Ml).collect();
     assert_eq!(contenders.len(), 2);
-    setting.scores(places, &contenders, draws, 5)
+    factors.errors(poses, &contenders, draws, 5)
 }
 
 /// Of each component, with its name.
-fn figures(score: &Score) -> impl Iterator<Item = (String, Figures)> + '_ {
-    let who = score.contender.approach;
-    (0..6).map(move |i| (format!("{who:?} {}", COMPONENTS[i]), score.tally.figures(i).unwrap()))
+fn statistics(errors: &ContenderErrors) -> impl Iterator<Item = (String, EfficiencyStatistics)> + '_ {
+    let who = errors.contender.approach;
+    (0..6).map(move |i| (format!("{who:?} {}", COMPONENTS[i]), errors.tally.statistics(i).unwrap()))
 }
 
 #[test]
 fn maximum_likelihood_reaches_the_bound() {
-    let places = places("C");
-    for setting in [
-        SETTING,
-        Setting { points: 128, ..SETTING },
-        Setting { noise_px: 0.5, ..SETTING },
-        Setting { noise_px: 0.5, ends: Ends::Later, ..SETTING },
+    let poses = poses("C");
+    for factors in [
+        FACTORS,
+        Factors { points: 128, ..FACTORS },
+        Factors { noise_px: 0.5, ..FACTORS },
+        Factors { noise_px: 0.5, ends: Ends::Later, ..FACTORS },
     ] {
-        for score in scores(&places, &setting, 100) {
-            assert_eq!(score.tally.refused, 0);
-            let nees_error = score.tally.nees_standard_error();
-            for (name, f) in figures(&score) {
+        for one in errors(&poses, &factors, 100) {
+            assert_eq!(one.tally.refused, 0);
+            let nees_error = one.tally.nees_standard_error();
+            for (name, f) in statistics(&one) {
                 let error = 4.0 * f.standard_error;
-                println!("{setting:?} {name}: {f:?} ± {nees_error}");
+                println!("{factors:?} {name}: {f:?} ± {nees_error}");
                 // What is found must mean something: the errors of a variance of its own draws would be 14 %.
                 assert!(error < 0.15, "{name} {f:?}");
                 assert!(
@@ -66,25 +73,25 @@ fn maximum_likelihood_reaches_the_bound() {
 
 #[test]
 fn outliers_cost_little_even_if_they_agree() {
-    let places = places("C");
+    let poses = poses("C");
     let draws = 60;
-    for kind in [Kind::Uniform, Kind::Coherent] {
-        let with = |outliers| Setting { outliers, kind, points: 1024, ..SETTING };
-        for score in scores(&places, &with(0.2), draws) {
-            for (name, f) in figures(&score) {
-                println!("20 % {kind:?} {name}: {f:?}");
+    for outlier_kind in [OutlierKind::Uniform, OutlierKind::Coherent] {
+        let with = |outliers| Factors { outliers, outlier_kind, points: 1024, ..FACTORS };
+        for one in errors(&poses, &with(0.2), draws) {
+            for (name, f) in statistics(&one) {
+                println!("20 % {outlier_kind:?} {name}: {f:?}");
                 let (bound, error) = (f.variance_over_bound, 4.0 * f.standard_error);
-                assert!(bound < 1.15 + error, "{kind:?} {name} {f:?}");
+                assert!(bound < 1.15 + error, "{outlier_kind:?} {name} {f:?}");
             }
         }
         let draws = 4 * draws;
-        for score in scores(&places, &with(0.4), draws) {
-            for (name, f) in figures(&score) {
-                println!("40 % {kind:?} {name}: {f:?}");
+        for one in errors(&poses, &with(0.4), draws) {
+            for (name, f) in statistics(&one) {
+                println!("40 % {outlier_kind:?} {name}: {f:?}");
                 let error = 4.0 * (0.99f64 * 0.01 / draws as f64).sqrt();
-                assert!(f.within_3_sigma > 0.99 - error, "{kind:?} {name} {f:?}");
+                assert!(f.within_3_sigma > 0.99 - error, "{outlier_kind:?} {name} {f:?}");
                 // One draw captured by the body, a hundred σ off, would make it forty.
-                assert!(f.variance_over_bound < 1.5, "{kind:?} {name} {f:?}");
+                assert!(f.variance_over_bound < 1.5, "{outlier_kind:?} {name} {f:?}");
             }
         }
     }
@@ -129,13 +136,12 @@ fn the_study_has_its_columns() {
 
 #[test]
 fn what_cannot_be_observed_is_said() {
-    use egomotion_study::efficiency::degenerate::SCENES;
     let ml: Vec<Contender> = [Approach::Differential, Approach::Discrete]
         .into_iter()
         .flat_map(Contender::all)
         .filter(|contender| contender.method == Method::Ml)
         .collect();
-    let scene = |name: &str| SCENES.iter().find(|scene| scene.name == name).unwrap().reports(&ml, 10, 3);
+    let scene = |name: &str| SCENES.iter().find(|scene| scene.name == name).unwrap().observed(&ml, 10, 3);
     // Points in depth and in the image determine everything, on a single plane too.
     for name in ["three planes", "one plane", "a single depth", "pure rotation"] {
         for report in scene(name) {

@@ -6,9 +6,9 @@ use egomotion::geometry::Twist;
 use egomotion::metrics::Nees;
 use egomotion::pipeline::{Approach, EstimatorKind, Method};
 use egomotion::sim::Sequence;
-use egomotion_study::contender::Contender;
-use egomotion_study::draw::{self, Measuring};
-use egomotion_study::world::World;
+use egomotion_study::synthetic::{
+    Contender, DifferentialDraw, DiscreteDraw, MeasurementModel, SyntheticWorld,
+};
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
@@ -27,22 +27,22 @@ impl Verdict {
         let sequence = Sequence::named("C", None, None, 1.0).unwrap();
         let phi = sequence.phi_cyclopean(0).unwrap();
         let truth = phi.seen_from(&sequence.rig.left_from_cyclopean()).vector();
-        let worlds: Vec<World> =
-            (-2..=2).map(|k| World::new(&sequence.scene, &sequence.rig, &phi, k, 1.0)).collect();
+        let worlds: Vec<SyntheticWorld> =
+            (-2..=2).map(|k| SyntheticWorld::new(&sequence.scene, &sequence.rig, &phi, k, 1.0)).collect();
         let contender = Contender { approach, method: Method::Dcce, estimator };
-        let measuring = Measuring { features: usize::MAX, ..Measuring::real() };
+        let model = MeasurementModel { features: usize::MAX, ..MeasurementModel::real() };
         let solve = |i: usize| {
             let (world, seed) = (&worlds[i % worlds.len()], 1_000_003 + i as u64);
             let config = contender.config(seed);
             match approach {
                 Approach::Differential => contender.differential(
-                    &draw::differential(world, &measuring, seed),
+                    &DifferentialDraw::new(world, &model, seed),
                     &world.rig,
                     &Twist::zero(),
                     &config,
                 ),
                 Approach::Discrete => contender.discrete(
-                    &draw::discrete(world, &measuring, seed),
+                    &DiscreteDraw::new(world, &model, seed),
                     &world.rig,
                     &Twist::zero(),
                     &config,

@@ -3,18 +3,16 @@
 use egomotion::geometry::Twist;
 use egomotion::pipeline::{Approach, EstimatorKind, Method};
 use egomotion::sim::Sequence;
-use egomotion_study::contender::Contender;
-use egomotion_study::draw::{self, Measuring};
-use egomotion_study::world::World;
+use egomotion_study::synthetic::{Contender, DifferentialDraw, MeasurementModel, SyntheticWorld};
 
 #[test]
 fn rounding_does_not_bring_the_scene_to_rest() {
     let sequence = Sequence::named("C", None, None, 1.0).unwrap();
     let phi = sequence.phi_cyclopean(0).unwrap();
-    let world = World::new(&sequence.scene, &sequence.rig, &phi, 0, 1.0);
+    let world = SyntheticWorld::new(&sequence.scene, &sequence.rig, &phi, 0, 1.0);
     for round in [4, 8, 16] {
-        let measuring = Measuring { round: Some(round), ..Measuring::clean() };
-        let draw = draw::differential(&world, &measuring, 1);
+        let model = MeasurementModel { round: Some(round), ..MeasurementModel::clean() };
+        let draw = DifferentialDraw::new(&world, &model, 1);
         let zeros = draw.changes.iter().filter(|c| c.disparity.mean[3] == 0.0).count();
         let solve = |method, estimator, start: &Twist| {
             let contender = Contender { approach: Approach::Differential, method, estimator };

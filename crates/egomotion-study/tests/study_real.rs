@@ -1,7 +1,7 @@
 //! Section 7.2 in small: one draw through the whole image pipeline, its records, tables and figures.
 
 use egomotion::pipeline::{Approach, Method};
-use egomotion_study::real::{Estimator, LabStudy, Quantity, Record, Way};
+use egomotion_study::real::{ImageContender, ImageEstimator, LabStudy, Quantity, RealRecord};
 use egomotion_study::{Cell, Content, Study};
 
 fn tiny(sequence: &str) -> LabStudy {
@@ -14,8 +14,10 @@ fn tiny(sequence: &str) -> LabStudy {
     }
 }
 
-fn phi(records: &[Record], way: Way) -> Vec<&Record> {
-    let known = |record: &&Record| record.way == Some(way) && Quantity::PHI.contains(&record.quantity);
+fn phi(records: &[RealRecord], contender: ImageContender) -> Vec<&RealRecord> {
+    let known = |record: &&RealRecord| {
+        record.contender == Some(contender) && Quantity::PHI.contains(&record.quantity)
+    };
     records.iter().filter(known).collect()
 }
 
@@ -24,17 +26,17 @@ fn one_draw_is_answered_by_every_way_and_best_within_its_own_intervals() {
     let study = tiny("lab-G");
     assert_eq!(study.parts(), ["lab-G seed 1"]);
     let records = study.run(0).unwrap();
-    for estimator in [Estimator::Ls, Estimator::Lmeds] {
+    for estimator in [ImageEstimator::Ls, ImageEstimator::Lmeds] {
         for approach in [Approach::Differential, Approach::Discrete] {
             for method in [Method::Dcce, Method::Dv] {
-                assert_eq!(phi(&records, Way::new(approach, method, estimator)).len(), 6);
+                assert_eq!(phi(&records, ImageContender::new(approach, method, estimator)).len(), 6);
             }
         }
         for method in [Method::Linear22, Method::Rigid] {
-            assert_eq!(phi(&records, Way::new(Approach::Discrete, method, estimator)).len(), 6);
+            assert_eq!(phi(&records, ImageContender::new(Approach::Discrete, method, estimator)).len(), 6);
         }
     }
-    let best = phi(&records, Way::BEST);
+    let best = phi(&records, ImageContender::BEST);
     assert_eq!(best.len(), 6);
     for record in best {
         let off = (record.estimate - record.truth).abs() / record.sigma.unwrap();
@@ -45,11 +47,12 @@ fn one_draw_is_answered_by_every_way_and_best_within_its_own_intervals() {
         let median = records.iter().find(|record| record.quantity == quantity).unwrap();
         assert!(median.estimate < 0.1 && median.n > 30_000, "{median:?}");
     }
-    // VZ of all five ways, where it can be measured and anywhere; the rigid one is the closest.
-    let vz: Vec<&Record> = records.iter().filter(|record| record.quantity == Quantity::Vz).collect();
+    // VZ of all five contenders, where it can be measured and anywhere; the rigid one is the closest.
+    let vz: Vec<&RealRecord> = records.iter().filter(|record| record.quantity == Quantity::Vz).collect();
     assert_eq!(vz.len(), 5);
-    let error = |record: &Record| record.erm_abs.unwrap();
-    let (best, others): (Vec<&Record>, Vec<&Record>) = vz.iter().partition(|r| r.way == Some(Way::BEST));
+    let error = |record: &RealRecord| record.erm_abs.unwrap();
+    let (best, others): (Vec<&RealRecord>, Vec<&RealRecord>) =
+        vz.iter().partition(|r| r.contender == Some(ImageContender::BEST));
     assert!(others.iter().all(|other| error(best[0]) < 0.2 * error(other)));
     assert!(vz.iter().all(|record| (record.truth + 10.0).abs() < 1e-9));
 }

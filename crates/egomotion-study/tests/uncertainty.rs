@@ -2,15 +2,8 @@
 
 use std::collections::HashMap;
 
-use egomotion::geometry::Gaussian;
-use egomotion::motion::depth_velocity as vz;
-use egomotion::observe::DepthChange;
-use egomotion_study::uncertainty::formula::{Inputs, Kind};
-use egomotion_study::uncertainty::monte_carlo::Noisy;
-use egomotion_study::uncertainty::trial::Case;
-use egomotion_study::uncertainty::{Finding, Uncertainty, UncertaintyError, resolution};
-use egomotion_study::{Cell, Content, Study, Table};
-use nalgebra::{Matrix2, Matrix4};
+use egomotion_study::uncertainty::{FormulaKind, Inputs, UncertaintyError, UncertaintyRecord, VarianceCase};
+use egomotion_study::{Cell, Content, Study, Table, Uncertainty};
 use serde_json::Value;
 
 /// A study small enough for a test.
@@ -18,14 +11,14 @@ fn small() -> Uncertainty {
     Uncertainty { draws: 20_000, settings: 2, size_px: (160, 120), ..Uncertainty::default() }
 }
 
-fn part(study: &Uncertainty, name: &str) -> Vec<Finding> {
+fn part(study: &Uncertainty, name: &str) -> Vec<UncertaintyRecord> {
     let index = study.parts().iter().position(|part| part == name).expect(name);
     study.run(index).unwrap()
 }
 
-fn cases(study: &Uncertainty, family: &str) -> Vec<Case> {
+fn cases(study: &Uncertainty, family: &str) -> Vec<VarianceCase> {
     let parts = ["A", "B", "C"].map(|s| part(study, &format!("{family}, sequence {s}")));
-    let case = |finding| if let Finding::Case(case) = finding { Some(*case) } else { None };
+    let case = |record| if let UncertaintyRecord::Case(case) = record { Some(*case) } else { None };
     parts.into_iter().flatten().filter_map(case).collect()
 }
 
@@ -55,12 +48,12 @@ fn corrected_and_second_order_variances_are_those_of_the_draws() {
         let (mut first, mut second) = (0, 0);
         for case in cases(&study, family).iter().filter(|case| case.place.is_some()) {
             let error = case.standard_error / case.predicted;
-            if case.kind == Kind::Corrected && case.relative() <= 0.02 {
+            if case.kind == FormulaKind::Corrected && case.relative() <= 0.02 {
                 // 1/d² has 10 (σ_d/d)² of second order: .004.
                 assert!((case.ratio() - 1.0).abs() < 0.006 + 5.0 * error, "{case:?} {}", case.ratio());
                 first += 1;
             }
-            if case.kind == Kind::SecondOrder && case.relative() <= 0.06 {
+            if case.kind == FormulaKind::SecondOrder && case.relative() <= 0.06 {
                 // The next order of 1/d² is about 200 (σ_d/d)⁴: .003.
                 assert!((case.ratio() - 1.0).abs() < 0.003 + 5.0 * error, "{case:?} {}", case.ratio());
                 second += 1;
@@ -76,15 +69,15 @@ fn printed_variances_are_right_for_what_they_assume_only() {
     let study = Uncertainty { settings: 4, ..small() };
     let found = cases(&study, "DV discrete (50)");
     let assumed = found.iter().filter(|c| c.formula == "(49)" && c.inputs == Inputs::Independent);
-    for case in assumed.filter(|c| c.kind == Kind::Printed && c.relative() <= 0.02) {
+    for case in assumed.filter(|c| c.kind == FormulaKind::Printed && c.relative() <= 0.02) {
         let error = case.standard_error / case.predicted;
         assert!((case.ratio() - 1.0).abs() < 0.006 + 5.0 * error, "{case:?}");
     }
     let found = cases(&study, "DCCE discrete (47)");
-    let slow = |c: &&Case| c.place.is_some_and(|p| p.flow_px < 1.0 && p.relative <= 0.02);
-    let halved: Vec<&Case> = found
+    let slow = |c: &&VarianceCase| c.place.is_some_and(|p| p.flow_px < 1.0 && p.relative <= 0.02);
+    let halved: Vec<&VarianceCase> = found
         .iter()
-        .filter(|c| c.formula.starts_with("(47) with") && c.kind == Kind::Printed)
+        .filter(|c| c.formula.starts_with("(47) with") && c.kind == FormulaKind::Printed)
         .filter(slow)
         .collect();
     // 2 + ½|Δ|² where it says ½ (1 + |Δ|²).
@@ -97,10 +90,11 @@ fn product_of_two_noises() {
     let study = Uncertainty { settings: 16, ..small() };
     let (mut missed, mut reached) = (0, 0);
     let found = cases(&study, "DCCE differential (39)");
-    for pair in found.windows(2).filter(|pair| pair[0].kind == Kind::FirstOrder && pair[0].relative() <= 0.02)
+    for pair in
+        found.windows(2).filter(|pair| pair[0].kind == FormulaKind::FirstOrder && pair[0].relative() <= 0.02)
     {
         let (first, corrected, place) = (&pair[0], &pair[1], pair[0].place.unwrap());
-        assert_eq!((corrected.kind, corrected.place), (Kind::Corrected, first.place));
+        assert_eq!((corrected.kind, corrected.place), (FormulaKind::Corrected, first.place));
         let excess = corrected.predicted / first.predicted - 1.0;
         // Reached where disparity has no gradient g, so that flow's noise alone does nothing. The disparity
         // that Zx and Zy share adds 8 g²/d² of it: 2 % where g is .5 px/px at d = 10 px.
@@ -113,33 +107,9 @@ fn product_of_two_noises() {
     assert!(missed >= 3 && reached >= 3, "{missed} {reached}");
 }
 
-/// Exact for jointly drawn, correlated gradients and flows, which the study's own cases do not have.
-#[test]
-fn product_of_correlated_noises() {
-    let gradient = Matrix2::new(0.04, 0.015, 0.015, 0.09);
-    let flow = Matrix2::new(0.25, -0.1, -0.1, 0.16);
-    let mut depth = Gaussian::independent([2.0, 0.3, -0.2, 0.1], [0.0, 0.0, 0.0, 0.01]);
-    depth.cov.fixed_view_mut::<2, 2>(1, 1).copy_from(&gradient);
-    let change =
-        DepthChange { x_px: 0.0, y_px: 0.0, depth, flow: Gaussian { mean: [0.5, -0.4].into(), cov: flow } };
-    let (g, v) = (gradient.cholesky().unwrap().l(), flow.cholesky().unwrap().l());
-    // A polynomial of second degree in its inputs: Taylor's second order is exact.
-    let exact = Noisy::new([(0.0, 1.0); 5], |n: &[f64]| {
-        let mut drawn = change;
-        let slope = g * nalgebra::Vector2::new(n[0], n[1]);
-        drawn.depth.mean += nalgebra::Vector4::new(0.0, slope.x, slope.y, 0.1 * n[4]);
-        drawn.flow.mean += v * nalgebra::Vector2::new(n[2], n[3]);
-        drawn.depth.cov = Matrix4::zeros();
-        vz::dcce(&drawn).vz().value()
-    });
-    let (with, without) = (vz::dcce_variance_with_product(&change), vz::dcce(&change).vz().variance());
-    assert!((exact.second_order() / with - 1.0).abs() < 1e-9, "{} {with}", exact.second_order());
-    assert!(with > 1.1 * without);
-}
-
 #[test]
 fn the_table_under_51() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/vectors.json");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../egomotion/tests/data/vectors.json");
     let all: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     let expected: HashMap<(u64, u64), f64> = all["resolution51_mm"]
         .as_array()
@@ -150,8 +120,9 @@ fn the_table_under_51() {
             (((16.0 * get("d")) as u64, (16.0 * get("step")) as u64), get("dZ_mm"))
         })
         .collect();
-    let table = resolution::table();
-    let [d, step, change] = ["disparity_px", "step_px", "change_mm"].map(|name| column(&table, name));
+    let published = Uncertainty { size_px: (40, 30), ..small() }.publish(&[]);
+    let table = published.tables.iter().find(|table| table.id == "table-51").unwrap();
+    let [d, step, change] = ["disparity_px", "step_px", "change_mm"].map(|name| column(table, name));
     assert_eq!(d.len(), expected.len());
     for ((d, step), change) in d.into_iter().zip(step).zip(change) {
         let key = ((16.0 * number(d)) as u64, (16.0 * number(step)) as u64);
@@ -192,8 +163,8 @@ fn coefficients_grow_with_depth() {
 #[test]
 fn dcce_is_the_better_one_below_root_three_pixels() {
     let study = small();
-    for finding in part(&study, "DCCE against DV, sequence A") {
-        let Finding::Comparison(found) = finding else { panic!("a comparison") };
+    for record in part(&study, "DCCE against DV, sequence A") {
+        let UncertaintyRecord::Ratios(found) = record else { panic!("ratios") };
         assert!((found.differential_rule.median - 1.0).abs() < 0.01, "{found:?}");
         assert!((found.discrete_rule.median - 1.0).abs() < 0.05, "{found:?}");
         assert!(
@@ -215,7 +186,7 @@ fn the_same_findings_on_any_number_of_threads_and_after_a_file() {
         let found = on(1);
         assert_eq!(found, on(3), "{name}");
         let text = serde_json::to_string(&found).unwrap();
-        assert_eq!(serde_json::from_str::<Vec<Finding>>(&text).unwrap(), found, "{name}");
+        assert_eq!(serde_json::from_str::<Vec<UncertaintyRecord>>(&text).unwrap(), found, "{name}");
     }
     let other = Uncertainty { seed: 1, ..study.clone() };
     assert_ne!(part(&study, "depth (32), sequence A"), part(&other, "depth (32), sequence A"));

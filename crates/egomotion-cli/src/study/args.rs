@@ -6,7 +6,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use egomotion::pipeline::Method;
 use egomotion::sim::Sequence;
-use egomotion_study::draw::LEAST_FEATURES;
+use egomotion_study::synthetic::LEAST_FEATURES;
 
 use crate::args::{MethodArg, positive, size};
 

@@ -9,13 +9,9 @@ mod tests;
 
 use anyhow::Result;
 use egomotion::pipeline::Observe;
-use egomotion_study::assumptions::Assumptions;
-use egomotion_study::consistency::{Consistency, DepthKind, RenderedSensor};
-use egomotion_study::draw::Measuring;
-use egomotion_study::efficiency::Efficiency;
-use egomotion_study::real::LabStudy;
-use egomotion_study::sensitivity::{OneSetting, Sensitivity};
-use egomotion_study::uncertainty::Uncertainty;
+use egomotion_study::consistency::{DepthKind, RenderedSensor};
+use egomotion_study::synthetic::MeasurementModel;
+use egomotion_study::{Assumptions, Consistency, Efficiency, LabStudy, OneSetting, Sensitivity, Uncertainty};
 
 use crate::run::set_threads;
 use crate::session::stop_signal;
@@ -55,7 +51,7 @@ fn one_setting(args: &TableArgs) -> OneSetting {
     OneSetting {
         sequence: args.sequence.clone(),
         step: args.step,
-        measuring: Measuring {
+        model: MeasurementModel {
             round: args.round.0,
             std_disp_px: args.std,
             std_vel_px: args.std,

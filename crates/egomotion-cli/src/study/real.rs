@@ -8,9 +8,8 @@ use egomotion::pipeline::Unanswered;
 use egomotion::sim::StereoImages;
 use egomotion_io::recording::Reader;
 use egomotion_io::source::{FrameFiles, Source};
-use egomotion_study::real::recording::{Measuring, Triple, publish};
-use egomotion_study::real::{Draw, LabStudy, RealError, Record};
-use egomotion_study::{Publication, Study};
+use egomotion_study::real::{DrawId, MatchingSettings, RealError, RealRecord, Triple, publish_recording};
+use egomotion_study::{LabStudy, Publication, Study};
 use serde::Serialize;
 
 use super::alone;
@@ -48,7 +47,7 @@ struct RecordingStudy {
     source: PathBuf,
     name: String,
     rig: StereoRig,
-    how: Measuring,
+    how: MatchingSettings,
     stride: usize,
     /// Numbers of the frames.
     indices: Vec<usize>,
@@ -87,7 +86,7 @@ impl RecordingStudy {
             source: path,
             name: sequence.name,
             rig,
-            how: Measuring {
+            how: MatchingSettings {
                 levels: args.round,
                 sample_step_px: args.sample.unwrap_or(SAMPLE_STEP_PX),
                 seed: args.laboratory.seed,
@@ -124,7 +123,7 @@ enum RecordingError {
 }
 
 impl Study for RecordingStudy {
-    type Record = Record;
+    type Record = RealRecord;
     type Error = RecordingError;
 
     fn name(&self) -> &'static str {
@@ -136,18 +135,18 @@ impl Study for RecordingStudy {
         middle.collect()
     }
 
-    fn run(&self, part: usize) -> Result<Vec<Record>, RecordingError> {
+    fn run(&self, part: usize) -> Result<Vec<RealRecord>, RecordingError> {
         let Some([a, b, c]) = self.triple(part) else { return Ok(Vec::new()) };
         let triple = Triple {
             frames: [self.read(&a.0)?, self.read(&b.0)?, self.read(&c.0)?],
             motion: [scene_motion(&a.1, &b.1), scene_motion(&b.1, &c.1)],
-            draw: Draw { sequence: self.name.clone(), pose: b.0.index as i64, seed: self.how.seed },
+            draw: DrawId { sequence: self.name.clone(), pose: b.0.index as i64, seed: self.how.seed },
         };
         Ok(triple.records(&self.rig, &self.how)?)
     }
 
-    fn publish(&self, records: &[Record]) -> Publication {
-        publish(&self.name, records)
+    fn publish(&self, records: &[RealRecord]) -> Publication {
+        publish_recording(&self.name, records)
     }
 }
 

@@ -2,87 +2,95 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::contender::Contender;
-use crate::draw::{self, Measuring};
-use crate::world::World;
-use crate::{Axis, Cell, Content, Figure, Line, Panel, Point, Series, Table};
+use crate::components::{NAMES, SYMBOLS};
+use crate::sequences::two_frames;
+use crate::synthetic::{Contender, DifferentialDraw, EDGE_RAYS, MeasurementModel, SyntheticWorld};
+use crate::{Axis, Cell, Content, Figure, Line, Panel, Series, Table};
 use egomotion::constrain::{LinearConstraint, image_flow};
 use egomotion::estimate::Row;
 use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
 use egomotion::geometry::{Image, StereoRig, Twist};
 use egomotion::observe::StereoFlow;
 use egomotion::pipeline::{Approach, EstimatorKind, Method};
-use egomotion::sim::{SensorNoise, Sequence, View, reference_pose};
+use egomotion::sim::{SensorNoise, Sequence, StereoImages, View, reference_pose};
 
-/// Multiples of sequence C's motion; its images move by 1 to 6 px at 1.
-pub(super) const STEPS: [f64; 6] = [0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0];
-/// Shares by which light grows from frame to frame, in percent.
-const LIGHTS: [f64; 3] = [0.0, 1.0, 5.0];
-/// Draws of each setting.
+/// Multiples of sequence C's motion, whose images move by 1 to 6 px. Brightness is linear over smaller motions alone.
+pub(super) const MOTION_FACTORS: [f64; 6] = [0.03125, 0.0625, 0.125, 0.25, 0.5, 1.0];
+/// Growth of the light from frame to frame, in percent: steady light, and two rates.
+const LIGHT_GROWTH_PERCENT: [f64; 3] = [0.0, 1.0, 5.0];
+/// Draws of each setting; more of them make the root mean square more certain and take longer.
 const DRAWS: u64 = 5;
-/// Rays through a pixel at an edge, along each side.
-const SAMPLES: usize = 3;
+/// Components of φ that are compared: all but ΩZ, which is zero in sequence C.
+const COMPARED: usize = 5;
 
 /// Root mean square error of φ's components, relative to the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BrightnessError {
     /// Multiple of sequence C's motion.
     pub step: f64,
-    /// What determines φ.
+    /// The measurements that determine φ.
     pub source: String,
     /// Errors of (tX, tY, tZ, ΩX, ΩY), in percent of the truth; ΩZ is zero there.
-    pub percent: [f64; 5],
+    pub percent: [f64; COMPARED],
 }
 
 /// Errors at one STEP, by depth exact and measured, and by brightness under steady and growing light.
 pub(super) fn errors(step: f64, seed: u64) -> Vec<BrightnessError> {
-    let Some(sequence) = Sequence::named("C", None, Some(2), 1.0) else { return Vec::new() };
+    let Some(sequence) = two_frames("C") else { return Vec::new() };
     let Some(phi) = sequence.phi_cyclopean(0) else { return Vec::new() };
-    let world = World::new(&sequence.scene, &sequence.rig, &phi, 0, step);
-    let exact = Measuring::clean();
-    let error = |source: &str, answers: Vec<Twist>| BrightnessError {
+    let world = SyntheticWorld::new(&sequence.scene, &sequence.rig, &phi, 0, step);
+    let error = |source: &str, estimates: Vec<Twist>| BrightnessError {
         step,
         source: source.to_owned(),
-        percent: relative(&answers, &world.phi),
+        percent: rms_percent(&estimates, &world.phi),
     };
-    let depth = |measuring: &Measuring| -> Vec<Twist> {
-        let of = |k| {
-            let draw = draw::differential(&world, measuring, seed + k);
-            let dcce = Contender {
-                approach: Approach::Differential,
-                method: Method::Dcce,
-                estimator: EstimatorKind::Ls,
-            };
-            Some(dcce.differential(&draw, &world.rig, &Twist::zero(), &dcce.config(seed)).ok()?.phi())
-        };
-        (0..DRAWS).filter_map(of).collect()
-    };
-    let mut found = vec![
-        error("depth, exact", depth(&exact)),
-        error("depth, 1/16 px, noise 1/8 px", depth(&Measuring::real())),
+    let mut errors = vec![
+        error("depth, exact", by_depth(&world, &MeasurementModel::clean(), seed)),
+        error("depth, 1/16 px, noise 1/8 px", by_depth(&world, &MeasurementModel::real(), seed)),
     ];
-    let moved = phi.scaled(step);
-    let pose = reference_pose(&phi, 0);
-    let clean = [moved.exp(), Twist::zero().exp(), moved.exp().inverse()]
-        .map(|motion| View::new(&sequence.scene, &sequence.rig, pose.after(&motion)).render(SAMPLES));
-    for light in LIGHTS {
-        let of = |k: u64| {
-            let frames = [0, 1, 2].map(|i| {
-                let noise = SensorNoise::default().with_seed(seed + k);
-                let mut lit = clean[i].clone();
-                let gain = 1.0 + 0.01 * light * (i as f64 - 1.0);
-                lit.left.values_mut().iter_mut().for_each(|grey| *grey *= gain as f32);
-                noise.expose(&lit, i as u64).left
-            });
-            // Depth as above, measured.
-            let draw = draw::differential(&world, &Measuring::real(), seed + k);
+    let clean = rendered(&sequence, &phi, step);
+    for growth in LIGHT_GROWTH_PERCENT {
+        let of_draw = |k: u64| {
+            let frames = lit(&clean, growth, seed + k);
+            // The same measured depth as above.
+            let draw = DifferentialDraw::new(&world, &MeasurementModel::real(), seed + k);
             by_brightness(&frames, &draw.motions, &world.rig)
         };
         let name =
-            if light > 0.0 { format!("brightness, light + {light} %") } else { "brightness".to_owned() };
-        found.push(error(&name, (0..DRAWS).filter_map(of).collect()));
+            if growth > 0.0 { format!("brightness, light + {growth} %") } else { "brightness".to_owned() };
+        errors.push(error(&name, (0..DRAWS).filter_map(of_draw).collect()));
     }
-    found
+    errors
+}
+
+/// φ by least squares of the differential DCCE, draw by draw.
+fn by_depth(world: &SyntheticWorld, model: &MeasurementModel, seed: u64) -> Vec<Twist> {
+    let dcce =
+        Contender { approach: Approach::Differential, method: Method::Dcce, estimator: EstimatorKind::Ls };
+    let of_draw = |k| {
+        let draw = DifferentialDraw::new(world, model, seed + k);
+        Some(dcce.differential(&draw, &world.rig, &Twist::zero(), &dcce.config(seed)).ok()?.phi())
+    };
+    (0..DRAWS).filter_map(of_draw).collect()
+}
+
+/// The images at t − 1, t and t + 1 without noise, under steady light.
+fn rendered(sequence: &Sequence, phi: &Twist, step: f64) -> [StereoImages; 3] {
+    let moved = phi.scaled(step);
+    let pose = reference_pose(phi, 0);
+    [moved.exp(), Twist::zero().exp(), moved.exp().inverse()]
+        .map(|motion| View::new(&sequence.scene, &sequence.rig, pose.after(&motion)).render(EDGE_RAYS))
+}
+
+/// The left images under light that grows from frame to frame, with the sensor's noise.
+fn lit(clean: &[StereoImages; 3], growth_percent: f64, seed: u64) -> [Image; 3] {
+    [0, 1, 2].map(|i| {
+        let noise = SensorNoise::default().with_seed(seed);
+        let mut images = clean[i].clone();
+        let gain = 1.0 + 0.01 * growth_percent * (i as f64 - 1.0);
+        images.left.values_mut().iter_mut().for_each(|grey| *grey *= gain as f32);
+        noise.expose(&images, i as u64).left
+    })
 }
 
 /// Least squares of Ex v_x + Ey v_y = −Et with v of (3): image flow along the gradient of brightness.
@@ -103,20 +111,19 @@ fn by_brightness(frames: &[Image; 3], points: &[StereoFlow], rig: &StereoRig) ->
     Some(Twist::from_vector(&least_squares(&rows, Weighting::Unit).ok()?.theta))
 }
 
-fn relative(answers: &[Twist], truth: &Twist) -> [f64; 5] {
+/// Root mean square errors of the estimates, in percent of the truth.
+fn rms_percent(estimates: &[Twist], truth: &Twist) -> [f64; COMPARED] {
     let truth = truth.vector();
     std::array::from_fn(|i| {
-        let squares: f64 = answers.iter().map(|a| (a.vector()[i] / truth[i] - 1.0).powi(2)).sum();
-        100.0 * (squares / answers.len() as f64).sqrt()
+        let squares: f64 = estimates.iter().map(|a| (a.vector()[i] / truth[i] - 1.0).powi(2)).sum();
+        100.0 * (squares / estimates.len() as f64).sqrt()
     })
 }
 
-const COMPONENTS: [&str; 5] = ["tX", "tY", "tZ", "ΩX", "ΩY"];
-
 pub(super) fn table(errors: &[&BrightnessError]) -> Table {
-    let columns =
-        [("step", "STEP"), ("source", "from"), ("tx", "tX (%)"), ("ty", "tY (%)"), ("tz", "tZ (%)")];
-    let columns: Vec<_> = columns.into_iter().chain([("wx", "ΩX (%)"), ("wy", "ΩY (%)")]).collect();
+    let headings = SYMBOLS.map(|symbol| format!("{symbol} (%)"));
+    let components = NAMES.into_iter().zip(headings.iter().map(String::as_str)).take(COMPARED);
+    let columns: Vec<_> = [("step", "STEP"), ("source", "from")].into_iter().chain(components).collect();
     let mut table = Table::new(
         "brightness",
         "φ from depth and from brightness",
@@ -138,15 +145,11 @@ pub(super) fn figure(errors: &[&BrightnessError]) -> Figure {
             sources.push(&error.source);
         }
     }
-    let panels = COMPONENTS.iter().enumerate().zip('a'..).map(|((i, name), letter)| {
+    let panels = SYMBOLS.iter().take(COMPARED).enumerate().zip('a'..).map(|((i, name), letter)| {
         let series = sources.iter().map(|source| {
-            let points = errors.iter().filter(|e| e.source == *source).map(|e| Point {
-                x: e.step,
-                y: e.percent[i],
-                standard_error: None,
-            });
+            let points = errors.iter().filter(|e| e.source == *source).map(|e| (e.step, e.percent[i]));
             let line = if source.starts_with("depth") { Line::Solid } else { Line::Dashed };
-            Series { name: (*source).to_owned(), line, points: points.collect() }
+            Series::through(source, line, points)
         });
         Panel {
             title: format!("({letter}) {name}"),

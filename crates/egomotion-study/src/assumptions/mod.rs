@@ -1,4 +1,6 @@
-//! What the paper takes for granted: depth is better than brightness (1, 3.1), and a small motion is instantaneous (4.3).
+//! Sections 1, 3.1 and 4.3: two assumptions that the paper makes and does not test.
+//!
+//! Depth is said to be better than brightness (1, 3.1), and a small motion is taken as instantaneous (4.3).
 
 mod brightness;
 mod instantaneous;
@@ -7,11 +9,12 @@ use std::convert::Infallible;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Publication, Study};
 pub use brightness::BrightnessError;
 pub use instantaneous::InstantaneousError;
 
-/// `study assumptions`.
+use crate::{Publication, Study};
+
+/// `study assumptions`: how far the paper's assumptions hold.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Assumptions {
@@ -25,9 +28,9 @@ impl Default for Assumptions {
     }
 }
 
-/// What a part finds.
+/// A finding of one part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Finding {
+pub enum AssumptionRecord {
     /// φ from depth and from brightness.
     Brightness(BrightnessError),
     /// Formulas for instants on finite motions.
@@ -35,7 +38,7 @@ pub enum Finding {
 }
 
 impl Study for Assumptions {
-    type Record = Finding;
+    type Record = AssumptionRecord;
     type Error = Infallible;
 
     fn name(&self) -> &'static str {
@@ -44,20 +47,24 @@ impl Study for Assumptions {
 
     fn parts(&self) -> Vec<String> {
         let brightness =
-            brightness::STEPS.iter().map(|step| format!("depth against brightness, STEP {step}"));
+            brightness::MOTION_FACTORS.iter().map(|step| format!("depth against brightness, STEP {step}"));
         brightness.chain(["instantaneous motion".to_owned()]).collect()
     }
 
-    fn run(&self, part: usize) -> Result<Vec<Finding>, Infallible> {
-        Ok(match brightness::STEPS.get(part) {
-            Some(&step) => brightness::errors(step, self.seed).into_iter().map(Finding::Brightness).collect(),
-            None => instantaneous::errors().into_iter().map(Finding::Instantaneous).collect(),
+    fn run(&self, part: usize) -> Result<Vec<AssumptionRecord>, Infallible> {
+        Ok(match brightness::MOTION_FACTORS.get(part) {
+            Some(&step) => {
+                brightness::errors(step, self.seed).into_iter().map(AssumptionRecord::Brightness).collect()
+            }
+            None => instantaneous::errors().into_iter().map(AssumptionRecord::Instantaneous).collect(),
         })
     }
 
-    fn publish(&self, records: &[Finding]) -> Publication {
-        let brightness: Vec<&BrightnessError> = records.iter().filter_map(Finding::brightness).collect();
-        let instants: Vec<&InstantaneousError> = records.iter().filter_map(Finding::instantaneous).collect();
+    fn publish(&self, records: &[AssumptionRecord]) -> Publication {
+        let brightness: Vec<&BrightnessError> =
+            records.iter().filter_map(AssumptionRecord::brightness).collect();
+        let instants: Vec<&InstantaneousError> =
+            records.iter().filter_map(AssumptionRecord::instantaneous).collect();
         Publication {
             title: "What the paper takes for granted".to_owned(),
             data: vec![brightness::table(&brightness), instantaneous::table(&instants)],
@@ -67,7 +74,7 @@ impl Study for Assumptions {
     }
 }
 
-impl Finding {
+impl AssumptionRecord {
     fn brightness(&self) -> Option<&BrightnessError> {
         if let Self::Brightness(error) = self { Some(error) } else { None }
     }

@@ -1,28 +1,26 @@
-//! Pictures of the verdicts.
+//! The figures of the consistency study.
 
-use super::Verdict;
-use crate::{Axis, Content, Figure, Line, Panel, Point, Series};
+use super::CoverageBySigma;
+use super::statistics::ConsistencyStatistics;
+use crate::components::SYMBOLS;
+use crate::{Axis, Content, Figure, Line, Panel, Series};
 
-fn series(name: &str, line: Line, points: impl Iterator<Item = (f64, f64)>) -> Series {
-    let points = points.map(|(x, y)| Point { x, y, standard_error: None }).collect();
-    Series { name: name.to_owned(), line, points }
-}
-
+/// A level line across so many places.
 fn level(name: &str, y: f64, count: usize) -> Series {
-    series(name, Line::Reference, [0.0, count.saturating_sub(1) as f64].into_iter().map(|x| (x, y)))
+    Series::through(name, Line::Reference, [0.0, count.saturating_sub(1) as f64].map(|x| (x, y)))
 }
 
 /// All figures.
-pub(super) fn all(verdicts: &[Verdict]) -> Vec<Figure> {
-    vec![by_sequence(verdicts), by_fifth(verdicts)]
+pub(super) fn all(statistics: &[ConsistencyStatistics]) -> Vec<Figure> {
+    vec![by_sequence(statistics), by_fifth(statistics)]
 }
 
 /// NEES/6 and coverage of each sequence.
-fn by_sequence(verdicts: &[Verdict]) -> Figure {
-    let names: Vec<&str> = verdicts.iter().map(|v| v.name.as_str()).collect();
+fn by_sequence(statistics: &[ConsistencyStatistics]) -> Figure {
+    let names: Vec<&str> = statistics.iter().map(|v| v.name.as_str()).collect();
     let places = || Axis::places("sequence", names.iter());
-    let points = |of: &dyn Fn(&Verdict) -> Option<f64>| {
-        let found = verdicts.iter().enumerate().filter_map(|(i, v)| Some((i as f64, of(v)?)));
+    let points = |of: &dyn Fn(&ConsistencyStatistics) -> Option<f64>| {
+        let found = statistics.iter().enumerate().filter_map(|(i, v)| Some((i as f64, of(v)?)));
         found.collect::<Vec<_>>().into_iter()
     };
     let nees = Content::Plot {
@@ -30,7 +28,7 @@ fn by_sequence(verdicts: &[Verdict]) -> Figure {
         y: Axis::linear("NEES/6"),
         series: vec![
             level("true covariance", 1.0, names.len()),
-            series("NEES/6", Line::Marks, points(&|v| v.nees_over_6)),
+            Series::through("NEES/6", Line::Marks, points(&|v| v.nees_over_6)),
         ],
     };
     let share = |v: Option<f64>| v.map(|share| 100.0 * share);
@@ -39,8 +37,8 @@ fn by_sequence(verdicts: &[Verdict]) -> Figure {
         y: Axis::linear("truth inside the 95 % interval (%)"),
         series: vec![
             level("95 %", 95.0, names.len()),
-            series("VZ", Line::Marks, points(&|v| share(v.depth_velocity.all().coverage95()))),
-            series("looming", Line::Marks, points(&|v| share(v.looming.all().coverage95()))),
+            Series::through("VZ", Line::Marks, points(&|v| share(v.depth_velocity.all().coverage95()))),
+            Series::through("looming", Line::Marks, points(&|v| share(v.looming.all().coverage95()))),
         ],
     };
     Figure {
@@ -58,15 +56,16 @@ fn by_sequence(verdicts: &[Verdict]) -> Figure {
 }
 
 /// Normalised variance by component, and share within 3 σ by σ.
-fn by_fifth(verdicts: &[Verdict]) -> Figure {
-    let pooled = verdicts.last();
+fn by_fifth(statistics: &[ConsistencyStatistics]) -> Figure {
+    let pooled = statistics.last();
     let numbered = |values: Vec<f64>| values.into_iter().enumerate().map(|(i, y)| (i as f64, y));
-    let of =
-        |name: &str, line, values: Option<Vec<f64>>| series(name, line, numbered(values.unwrap_or_default()));
+    let of = |name: &str, line, values: Option<Vec<f64>>| {
+        Series::through(name, line, numbered(values.unwrap_or_default()))
+    };
     let variances = Content::Plot {
         x: Axis::places(
             "component, and eigen-direction from the surest on",
-            ["tX 1", "tY 2", "tZ 3", "ΩX 4", "ΩY 5", "ΩZ 6"],
+            SYMBOLS.iter().zip(1..).map(|(symbol, rank)| format!("{symbol} {rank}")),
         ),
         y: Axis::linear("mean squared error over variance"),
         series: vec![
@@ -75,14 +74,15 @@ fn by_fifth(verdicts: &[Verdict]) -> Figure {
             of("eigen-direction", Line::Marks, pooled.map(|v| v.directions.to_vec())),
         ],
     };
-    let share3 = |by: &super::BySigma| by.fifths().iter().filter_map(|f| Some(100.0 * f.share3()?)).collect();
+    let within_3_sigma =
+        |by: &CoverageBySigma| by.fifths().iter().filter_map(|f| Some(100.0 * f.coverage3()?)).collect();
     let fifths = Content::Plot {
         x: Axis::places("fifth of the pixels by σ, the surest first", ["1", "2", "3", "4", "5"]),
         y: Axis::linear("within 3 σ (%)"),
         series: vec![
             level("Gaussian", 99.73, 5),
-            of("VZ", Line::Solid, pooled.map(|v| share3(&v.depth_velocity))),
-            of("looming", Line::Solid, pooled.map(|v| share3(&v.looming))),
+            of("VZ", Line::Solid, pooled.map(|v| within_3_sigma(&v.depth_velocity))),
+            of("looming", Line::Solid, pooled.map(|v| within_3_sigma(&v.looming))),
         ],
     };
     Figure {

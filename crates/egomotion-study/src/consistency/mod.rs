@@ -1,33 +1,36 @@
-//! Whether the stated uncertainty is true: images in, φ, VZ and looming out, judged by exact truth.
+//! Whether the stated uncertainty is true: images in, φ, VZ and looming out, set against exact truth.
 //!
-//! Every pair of frames stands at a random pose of its own, with a texture and a noise of its own, so that pairs
-//! are independent and nothing repeats.
+//! Each pair of frames stands at a random pose of its own, with a texture and noise of its own, so that pairs are
+//! independent. The statistics are NEES, normalised variances and coverage ([`CoverageBySigma`]). The paper has no
+//! such study: it says what the uncertainties of sections 5 and 6 are worth once images are matched.
 
-mod by_sigma;
-mod depth;
+mod coverage;
+mod depth_camera;
 mod figures;
 mod pair;
-mod verdict;
+mod statistics;
+mod tables;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-pub use by_sigma::BySigma;
-pub use verdict::Verdict;
+pub use coverage::{CoverageBySigma, CoverageCounts};
+pub use depth_camera::DepthKind;
 
-use super::{Cell, Publication, Study, Table};
 use crate::range::{COUNTS, OutOfRange, sequences, size, within};
-pub use depth::DepthKind;
+use crate::sequences::{NoSequence, PAPER_SEQUENCES, owned, required};
+use crate::{Publication, Study};
 use egomotion::pipeline::Observe;
 use egomotion::pipeline::PipelineError;
 use egomotion::sim::Sequence;
-use pair::Pair;
+use pair::RandomPair;
+use statistics::ConsistencyStatistics;
 
-/// Pairs that one part takes.
+/// Pairs of one part: more make fewer, longer parts, and so a longer wait for the first results.
 const PAIRS_PER_PART: usize = 10;
 
-/// What takes a pair of frames.
+/// The sensor that takes a pair of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RenderedSensor {
@@ -37,7 +40,7 @@ pub enum RenderedSensor {
     Depth(DepthKind),
 }
 
-/// The whole pipeline on random pairs of named sequences.
+/// `study consistency`: the whole pipeline on random pairs of rendered sequences.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Consistency {
@@ -47,9 +50,9 @@ pub struct Consistency {
     pub width_px: usize,
     /// Height of the images, in pixels.
     pub height_px: usize,
-    /// What takes the pairs.
+    /// The sensor that takes the pairs.
     pub sensor: RenderedSensor,
-    /// What is measured in the images; `Sparse` gives no maps.
+    /// Dense measurements, or tracks alone, which give no maps.
     pub observe: Observe,
     /// Pairs of each sequence.
     pub pairs: usize,
@@ -59,9 +62,9 @@ pub struct Consistency {
 
 impl Default for Consistency {
     fn default() -> Self {
-        let paper = ["A", "B", "C", "drive"].into_iter();
+        let sequences = PAPER_SEQUENCES.into_iter().chain(["drive"]).chain(Sequence::lab_names());
         Self {
-            sequences: paper.chain(Sequence::lab_names()).map(str::to_owned).collect(),
+            sequences: owned(sequences),
             width_px: 320,
             height_px: 240,
             sensor: RenderedSensor::Stereo,
@@ -76,23 +79,16 @@ impl Default for Consistency {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ConsistencyError {
     /// There is no such sequence, or the images have no pixels.
-    #[error("no sequence {name} of {width}x{height} pixels")]
-    Sequence {
-        /// Its name.
-        name: String,
-        /// Width asked for, in pixels.
-        width: usize,
-        /// Height asked for, in pixels.
-        height: usize,
-    },
+    #[error(transparent)]
+    Sequence(#[from] NoSequence),
     /// The pipeline refuses the rig.
     #[error(transparent)]
     Pipeline(#[from] PipelineError),
 }
 
-/// What one pair says.
+/// Error and covariance of φ for one pair, and the coverage of its pixels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Record {
+pub struct ConsistencyRecord {
     /// The sequence.
     pub sequence: String,
     /// Number of the pair in its sequence.
@@ -102,9 +98,9 @@ pub struct Record {
     /// Covariance of φ, row by row.
     pub cov: Vec<f64>,
     /// VZ of every pixel against the truth.
-    pub depth_velocity: BySigma,
+    pub depth_velocity: CoverageBySigma,
     /// Looming of every pixel against the truth.
-    pub looming: BySigma,
+    pub looming: CoverageBySigma,
     /// Share of the pixels in front of a surface that have an answer.
     pub answered: f64,
 }
@@ -115,16 +111,10 @@ impl Consistency {
         let starts = || (0..self.pairs).step_by(PAIRS_PER_PART);
         self.sequences.iter().flat_map(|name| starts().map(move |start| (name.as_str(), start))).collect()
     }
-
-    fn sequence(&self, name: &str) -> Result<Sequence, ConsistencyError> {
-        let size = (self.width_px, self.height_px);
-        let unknown = || ConsistencyError::Sequence { name: name.to_owned(), width: size.0, height: size.1 };
-        Sequence::named(name, Some(size), Some(2), 1.0).ok_or_else(unknown)
-    }
 }
 
 impl Study for Consistency {
-    type Record = Record;
+    type Record = ConsistencyRecord;
     type Error = ConsistencyError;
 
     fn name(&self) -> &'static str {
@@ -142,35 +132,25 @@ impl Study for Consistency {
         self.chunks().into_iter().map(name).collect()
     }
 
-    fn run(&self, part: usize) -> Result<Vec<Record>, ConsistencyError> {
+    fn run(&self, part: usize) -> Result<Vec<ConsistencyRecord>, ConsistencyError> {
         let Some(&(name, start)) = self.chunks().get(part) else { return Ok(Vec::new()) };
-        let sequence = self.sequence(name)?;
+        let sequence = required(name, Some((self.width_px, self.height_px)))?;
         (start..(start + PAIRS_PER_PART).min(self.pairs))
             .into_par_iter()
-            .map(|pair| Ok(Pair::new(&sequence, pair, self.seed).judge(self.sensor, self.observe)?))
+            .map(|pair| Ok(RandomPair::new(&sequence, pair, self.seed).record(self.sensor, self.observe)?))
             .collect()
     }
 
-    fn publish(&self, records: &[Record]) -> Publication {
-        let caption = "Each pair at a random pose with its own texture and noise, through the whole image \
-                       pipeline. NEES/6 is 1 and a normalised variance is 1 where covariances are true.";
-        let mut table =
-            Table::new("consistency", "Uncertainty against exact truth", caption, &verdict::COLUMNS);
+    fn publish(&self, records: &[ConsistencyRecord]) -> Publication {
         let named = |name: &str| records.iter().filter(|r| r.sequence == name).collect::<Vec<_>>();
-        let mut verdicts: Vec<Verdict> =
-            self.sequences.iter().map(|name| Verdict::of(name, &named(name))).collect();
-        verdicts.push(Verdict::of("all", &records.iter().collect::<Vec<_>>()));
-        table.rows = verdicts.iter().map(Verdict::cells).collect();
+        let mut statistics: Vec<ConsistencyStatistics> =
+            self.sequences.iter().map(|name| ConsistencyStatistics::of(name, &named(name))).collect();
+        statistics.push(ConsistencyStatistics::of("all", &records.iter().collect::<Vec<_>>()));
         Publication {
             title: "Is the stated uncertainty true?".into(),
-            data: vec![table, verdict::pairs(records)],
-            tables: vec![verdict::directions(&verdicts)],
-            figures: figures::all(&verdicts),
+            data: vec![tables::consistency(&statistics), tables::pairs(records)],
+            tables: vec![tables::normalised_variances(&statistics)],
+            figures: figures::all(&statistics),
         }
     }
-}
-
-/// A cell that says how many of how many in percent.
-fn percent(share: Option<f64>) -> Cell {
-    share.map(|share| 100.0 * share).into()
 }

@@ -1,12 +1,13 @@
 //! Variance over the bound by method, by noise and number of points, and by outliers.
 
-use super::setting::{Ends, Kind, Score, Setting};
-use super::{COMPONENTS, HELD, NOISE_PX, OUTLIERS, POINTS, Record};
-use crate::contender::Contender;
+use super::factors::{BASELINE, Factors, NOISE_PX, OutlierKind, POINTS, outlier_shares};
+use super::{ContenderErrors, EfficiencyRecord};
+use crate::components::NAMES;
+use crate::synthetic::{APPROACHES, Contender, approach_name};
 use crate::{Axis, Content, Figure, Line, Panel, Point, Series};
 use egomotion::pipeline::{Approach, EstimatorKind, Method};
 
-/// Lines of the figures.
+/// The contenders that figures show, each with the name of its line.
 const CONTENDERS: [(&str, Method, EstimatorKind); 9] = [
     ("DCCE, LS", Method::Dcce, EstimatorKind::Ls),
     ("DCCE, LMedS", Method::Dcce, EstimatorKind::Lmeds),
@@ -18,51 +19,47 @@ const CONTENDERS: [(&str, Method, EstimatorKind); 9] = [
     ("rigid, IRLS", Method::Rigid, EstimatorKind::Irls),
     ("ML", Method::Ml, EstimatorKind::Irls),
 ];
-const APPROACHES: [(&str, Approach); 2] =
-    [("differential", Approach::Differential), ("discrete", Approach::Discrete)];
 
 /// Figures of one sequence, C where it is among them; the files hold every other.
-pub(super) fn figures(sequences: &[String], records: &[Record]) -> Vec<Figure> {
+pub(super) fn all(sequences: &[String], records: &[EfficiencyRecord]) -> Vec<Figure> {
     let Some(sequence) = sequences.iter().find(|name| *name == "C").or(sequences.first()) else {
         return Vec::new();
     };
-    let plots = Plots { sequence, records };
-    let outliers = [Kind::Uniform, Kind::Coherent].map(|kind| plots.by_outliers(kind));
+    let plots = EfficiencyPlots { sequence, records };
+    let outliers = [OutlierKind::Uniform, OutlierKind::Coherent].map(|kind| plots.by_outliers(kind));
     let mut figures: Vec<Figure> =
         [plots.by_method(), plots.by_noise()].into_iter().chain(outliers).collect();
-    figures.retain(|figure| figure.panels.iter().any(has_a_line));
+    figures.retain(Figure::has_a_line);
     figures
 }
 
-fn has_a_line(panel: &Panel) -> bool {
-    matches!(&panel.content, Content::Plot { series, .. } if !series.is_empty())
-}
-
-struct Plots<'a> {
+/// The records of one sequence, from which its figures are drawn.
+struct EfficiencyPlots<'a> {
     sequence: &'a str,
-    records: &'a [Record],
+    records: &'a [EfficiencyRecord],
 }
 
-impl Plots<'_> {
-    fn score(&self, setting: &Setting, contender: &Contender) -> Option<&Score> {
+impl EfficiencyPlots<'_> {
+    fn errors(&self, at: &Factors, contender: &Contender) -> Option<&ContenderErrors> {
         self.records.iter().find_map(|record| match record {
-            Record::Errors { sequence, setting: at, score } => {
-                let same = sequence == self.sequence && at == setting && score.contender == *contender;
-                same.then_some(score.as_ref())
+            EfficiencyRecord::Errors { sequence, factors, errors } => {
+                let same = sequence == self.sequence && at == factors && errors.contender == *contender;
+                same.then_some(errors.as_ref())
             }
-            Record::Observed { .. } => None,
+            EfficiencyRecord::Observed { .. } => None,
         })
     }
 
+    /// Variance over the bound of one component of φ, or of the worst one.
     fn point(
         &self,
         x: usize,
-        setting: &Setting,
+        factors: &Factors,
         contender: &Contender,
         component: Option<usize>,
     ) -> Option<Point> {
-        let tally = &self.score(setting, contender)?.tally;
-        let of = |i: usize| tally.figures(i).map(|f| (f.variance_over_bound, f.standard_error));
+        let tally = &self.errors(factors, contender)?.tally;
+        let of = |i: usize| tally.statistics(i).map(|f| (f.variance_over_bound, f.standard_error));
         let (y, standard_error) = match component {
             Some(i) => of(i)?,
             None => (0..6).filter_map(of).reduce(|a, b| if b.0 > a.0 { b } else { a })?,
@@ -70,27 +67,18 @@ impl Plots<'_> {
         Some(Point { x: x as f64, y, standard_error: Some(standard_error) })
     }
 
-    /// One line for each contender: `settings` from left to right.
-    fn panel(
-        &self,
-        title: String,
-        x: Axis,
-        approach: Approach,
-        settings: &[Setting],
-        component: Option<usize>,
-    ) -> Panel {
+    /// The worst component of each contender, a line each: `settings` from left to right.
+    fn panel(&self, title: String, x: Axis, approach: Approach, settings: &[Factors]) -> Panel {
         let series = CONTENDERS.into_iter().filter_map(|(name, method, estimator)| {
             let contender = Contender { approach, method, estimator };
-            let point = |(x, setting)| self.point(x, setting, &contender, component);
+            let point = |(x, factors)| self.point(x, factors, &contender, None);
             let points: Vec<Point> = settings.iter().enumerate().filter_map(point).collect();
             let line = if method == Method::Ml { Line::Solid } else { Line::Dashed };
             (!points.is_empty()).then(|| Series { name: name.to_owned(), line, points })
         });
         let mut series: Vec<Series> = series.collect();
         if !series.is_empty() {
-            let at = |x: usize| Point { x: x as f64, y: 1.0, standard_error: None };
-            let points = (0..settings.len()).map(at).collect();
-            series.push(Series { name: "bound".to_owned(), line: Line::Reference, points });
+            series.push(bound(settings.len()));
         }
         Panel { title, content: Content::Plot { x, y: Axis::log("variance/bound"), series } }
     }
@@ -105,24 +93,22 @@ impl Plots<'_> {
         }
     }
 
-    /// Each component by every contender at the held setting.
+    /// Each component by every contender at the baseline.
     fn by_method(&self) -> Figure {
-        let panels = APPROACHES.map(|(name, approach)| {
+        let panels = APPROACHES.map(|approach| {
             let series = CONTENDERS.into_iter().filter_map(|(label, method, estimator)| {
                 let contender = Contender { approach, method, estimator };
                 let points: Vec<Point> =
-                    (0..6).filter_map(|i| self.point(i, &HELD, &contender, Some(i))).collect();
+                    (0..6).filter_map(|i| self.point(i, &BASELINE, &contender, Some(i))).collect();
                 (!points.is_empty()).then(|| Series { name: label.to_owned(), line: Line::Marks, points })
             });
             let mut series: Vec<Series> = series.collect();
             if !series.is_empty() {
-                let points =
-                    (0..6).map(|i| Point { x: f64::from(i), y: 1.0, standard_error: None }).collect();
-                series.push(Series { name: "bound".to_owned(), line: Line::Reference, points });
+                series.push(bound(6));
             }
-            let x = Axis::places("component", COMPONENTS);
+            let x = Axis::places("component", NAMES);
             Panel {
-                title: name.to_owned(),
+                title: approach_name(approach).to_owned(),
                 content: Content::Plot { x, y: Axis::log("variance/bound"), series },
             }
         });
@@ -131,19 +117,14 @@ impl Plots<'_> {
     }
 
     fn by_noise(&self) -> Figure {
-        let panels = APPROACHES.into_iter().flat_map(|(name, approach)| {
-            let noise = NOISE_PX.map(|noise_px| Setting { noise_px, ..HELD });
+        let panels = APPROACHES.into_iter().flat_map(|approach| {
+            let name = approach_name(approach);
+            let noise = NOISE_PX.map(|noise_px| Factors { noise_px, ..BASELINE });
             let places = NOISE_PX.map(|noise| format!("1/{}", noise.recip()));
-            let points = POINTS.map(|points| Setting { points, ..HELD });
+            let points = POINTS.map(|points| Factors { points, ..BASELINE });
             [
-                self.panel(format!("{name}, noise"), Axis::places("σ (px)", places), approach, &noise, None),
-                self.panel(
-                    format!("{name}, points"),
-                    Axis::places("points", POINTS),
-                    approach,
-                    &points,
-                    None,
-                ),
+                self.panel(format!("{name}, noise"), Axis::places("σ (px)", places), approach, &noise),
+                self.panel(format!("{name}, points"), Axis::places("points", POINTS), approach, &points),
             ]
         });
         let caption =
@@ -156,18 +137,27 @@ impl Plots<'_> {
         )
     }
 
-    fn by_outliers(&self, kind: Kind) -> Figure {
+    fn by_outliers(&self, kind: OutlierKind) -> Figure {
         let (stem, what) = match kind {
-            Kind::Uniform => ("efficiency-uniform", "uniform outliers"),
-            Kind::Coherent => ("efficiency-coherent", "one moving body"),
+            OutlierKind::Uniform => ("efficiency-uniform", "uniform outliers"),
+            OutlierKind::Coherent => ("efficiency-coherent", "one moving body"),
         };
-        let with = |outliers| Setting { outliers, kind, ends: Ends::Both, ..HELD };
-        let settings: Vec<Setting> = [HELD].into_iter().chain(OUTLIERS.map(with)).collect();
-        let panels = APPROACHES.map(|(name, approach)| {
-            let places = settings.iter().map(|setting| format!("{:.0} %", 100.0 * setting.outliers));
-            self.panel(name.to_owned(), Axis::places("outliers", places), approach, &settings, None)
+        let settings: Vec<Factors> = [BASELINE].into_iter().chain(outlier_shares(kind)).collect();
+        let panels = APPROACHES.map(|approach| {
+            let places = settings.iter().map(|factors| format!("{:.0} %", 100.0 * factors.outliers));
+            self.panel(
+                approach_name(approach).to_owned(),
+                Axis::places("outliers", places),
+                approach,
+                &settings,
+            )
         });
         let caption = "The worst component of each contender, in units of the bound of the inliers alone.";
         self.figure(stem, &format!("variance over the bound, {what}"), caption, panels.into())
     }
+}
+
+/// The line of the bound under so many places.
+fn bound(places: usize) -> Series {
+    Series::through("bound", Line::Reference, (0..places).map(|x| (x as f64, 1.0)))
 }

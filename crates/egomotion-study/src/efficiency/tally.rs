@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 use egomotion::estimate::MotionEstimate;
 use egomotion::geometry::{Gaussian, Twist};
 
-/// Half the width of a 95 % interval in standard deviations.
+/// Half the width of a 95 % interval of the normal distribution, in standard deviations.
 const SIGMAS_95: f64 = 1.959_963_984_540_054;
 
-/// Sums of one component.
+/// ComponentSums of one component.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-struct Sums {
+struct ComponentSums {
     /// Σ (u − z).
     shift: f64,
     /// Σ (u² − z²) and of its square.
@@ -28,20 +28,20 @@ struct Sums {
 
 /// Errors of one contender over the draws of one setting.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Tally {
+pub struct EfficiencyTally {
     /// Draws with a complete answer.
     pub draws: usize,
     /// Draws without one.
     pub refused: usize,
-    components: [Sums; 6],
+    components: [ComponentSums; 6],
     /// Σ (NEES/6 − that of z), of its square, and its draws.
     nees: [f64; 2],
     nees_draws: usize,
 }
 
-/// What the errors of one component say.
+/// Statistics of the errors of one component.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Figures {
+pub struct EfficiencyStatistics {
     /// Var(component)/bound.
     pub variance_over_bound: f64,
     /// Standard error of that.
@@ -56,14 +56,14 @@ pub struct Figures {
     pub within_3_sigma: f64,
 }
 
-impl Tally {
+impl EfficiencyTally {
     /// One draw without an answer.
-    pub fn refusal() -> Self {
+    pub(super) fn refusal() -> Self {
         Self { refused: 1, ..Self::default() }
     }
 
     /// One draw: an estimate beside the efficient one, whose covariance is the bound.
-    pub fn of(estimate: &MotionEstimate, efficient: &Gaussian<6>, truth: &Twist) -> Self {
+    pub(super) fn of(estimate: &MotionEstimate, efficient: &Gaussian<6>, truth: &Twist) -> Self {
         let truth = truth.vector();
         let error = estimate.theta.mean - truth;
         let bound: Vector6<f64> = efficient.cov.diagonal().map(f64::sqrt);
@@ -71,7 +71,7 @@ impl Tally {
         let component = |i: usize| {
             let excess = u[i] * u[i] - z[i] * z[i];
             let own = error[i].abs() / estimate.theta.cov[(i, i)].sqrt();
-            Sums {
+            ComponentSums {
                 shift: u[i] - z[i],
                 excess: [excess, excess * excess],
                 covered: usize::from(own <= SIGMAS_95),
@@ -90,7 +90,7 @@ impl Tally {
     }
 
     /// These draws and others.
-    pub fn merged(mut self, other: &Self) -> Self {
+    pub(super) fn merged(mut self, other: &Self) -> Self {
         self.draws += other.draws;
         self.refused += other.refused;
         self.nees_draws += other.nees_draws;
@@ -106,13 +106,13 @@ impl Tally {
         self
     }
 
-    /// The figures of component `i` of φ; `None` without an answer.
-    pub fn figures(&self, i: usize) -> Option<Figures> {
+    /// The statistics of component `i` of φ; `None` without an answer.
+    pub fn statistics(&self, i: usize) -> Option<EfficiencyStatistics> {
         let sums = self.components.get(i).filter(|_| self.draws > 0)?;
         let n = self.draws as f64;
         let (bias, excess) = (sums.shift / n, sums.excess[0] / n);
         let scatter = (sums.excess[1] / n - excess * excess).max(0.0);
-        Some(Figures {
+        Some(EfficiencyStatistics {
             variance_over_bound: 1.0 + excess - bias * bias,
             standard_error: (scatter / n).sqrt(),
             bias_over_sigma: bias,
@@ -151,16 +151,16 @@ mod tests {
         };
         // Errors of 1.5 and −0.5 σ where the efficient ones are ±1 σ.
         let truth = Twist::zero();
-        let both = Tally::of(&estimate(3.0), &efficient(2.0), &truth)
-            .merged(&Tally::of(&estimate(-1.0), &efficient(-2.0), &truth))
-            .merged(&Tally::refusal());
-        let figures = both.figures(2).unwrap();
+        let both = EfficiencyTally::of(&estimate(3.0), &efficient(2.0), &truth)
+            .merged(&EfficiencyTally::of(&estimate(-1.0), &efficient(-2.0), &truth))
+            .merged(&EfficiencyTally::refusal());
+        let figures = both.statistics(2).unwrap();
         assert_eq!((both.draws, both.refused), (2, 1));
         assert!((figures.bias_over_sigma - 0.5).abs() < 1e-12);
         assert!((figures.variance_over_bound - 1.0).abs() < 1e-12, "{figures:?}");
         // NEES/6 of 9 and 1, where the efficient ones have 1.
         assert!((figures.nees_over_6 - 5.0).abs() < 1e-12);
         assert_eq!((figures.coverage_95, figures.within_3_sigma), (0.5, 1.0));
-        assert!(Tally::refusal().figures(0).is_none() && both.figures(6).is_none());
+        assert!(EfficiencyTally::refusal().statistics(0).is_none() && both.statistics(6).is_none());
     }
 }

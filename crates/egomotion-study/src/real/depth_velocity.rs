@@ -2,45 +2,44 @@
 
 use rayon::prelude::*;
 
-use super::measured::Measured;
-use super::way::{Estimator, Way};
+use super::contender::{ImageContender, ImageEstimator};
+use super::matching::MatchedFrames;
 use egomotion::geometry::Field;
 use egomotion::motion::DepthVelocity;
 use egomotion::motion::depth_velocity::{dcce, dv, dv_discrete};
 use egomotion::pipeline::{Approach, FrameMotion, Method};
 
-/// The ways of finding VZ at a pixel: (7), (9), (17) and (21).
-pub const WAYS: [Way; 4] = [
-    Way::new(Approach::Differential, Method::Dcce, Estimator::Pixel),
-    Way::new(Approach::Differential, Method::Dv, Estimator::Pixel),
-    Way::new(Approach::Discrete, Method::Dcce, Estimator::Pixel),
-    Way::new(Approach::Discrete, Method::Dv, Estimator::Pixel),
+/// The contenders of finding VZ at a pixel: (7), (9), (17) and (21).
+pub(super) const PIXEL_CONTENDERS: [ImageContender; 4] = [
+    ImageContender::new(Approach::Differential, Method::Dcce, ImageEstimator::Pixel),
+    ImageContender::new(Approach::Differential, Method::Dv, ImageEstimator::Pixel),
+    ImageContender::new(Approach::Discrete, Method::Dcce, ImageEstimator::Pixel),
+    ImageContender::new(Approach::Discrete, Method::Dv, ImageEstimator::Pixel),
 ];
 
-/// The maps of [`WAYS`], and that of the pipeline's answer for the same frames.
-pub fn maps(measured: &Measured, best: &FrameMotion) -> Vec<(Way, Field)> {
-    let best = best.dense.as_ref().map(|dense| (Way::BEST, dense.motion.depth_velocity.clone()));
-    WAYS.map(|way| (way, map(measured, way))).into_iter().chain(best).collect()
+/// The maps of [`PIXEL_CONTENDERS`], and that of the pipeline's answer for the same frames.
+pub(super) fn maps(matched: &MatchedFrames, pipeline: &FrameMotion) -> Vec<(ImageContender, Field)> {
+    let best =
+        pipeline.dense.as_ref().map(|dense| (ImageContender::BEST, dense.motion.depth_velocity.clone()));
+    PIXEL_CONTENDERS.map(|contender| (contender, map(matched, contender))).into_iter().chain(best).collect()
 }
 
-/// VZ in metres per frame, on the pixel grid of t; missing where something it needs was not measured.
+/// VZ in metres per frame, on the pixel grid of t; missing where something it needs was not matched.
 ///
-/// A way that is not one of [`WAYS`] gives a map without any value.
-pub fn map(measured: &Measured, way: Way) -> Field {
-    let bf = measured.rig.depth_disparity_product();
-    let pair = measured.pair();
+/// A contender that is not one of [`PIXEL_CONTENDERS`] gives a map without any value.
+fn map(matched: &MatchedFrames, contender: ImageContender) -> Field {
+    let bf = matched.rig.depth_disparity_product();
+    let pair = matched.pair();
     let at = |u: usize, v: usize| -> Option<DepthVelocity> {
-        match (way.method, way.approach) {
-            (Method::Dcce, Approach::Differential) => {
-                Some(dcce(&measured.depth_flow(u, v)?.depth_change(bf)))
-            }
-            (Method::Dv, Approach::Differential) => Some(dv(&measured.stereo_flow(u, v)?, bf)),
+        match (contender.method, contender.approach) {
+            (Method::Dcce, Approach::Differential) => Some(dcce(&matched.depth_flow(u, v)?.depth_change(bf))),
+            (Method::Dv, Approach::Differential) => Some(dv(&matched.stereo_flow(u, v)?, bf)),
             (Method::Dcce, Approach::Discrete) => Some(dcce(&pair.depth_track(u, v)?.depth_change(bf))),
             (Method::Dv, Approach::Discrete) => Some(dv_discrete(&pair.stereo_track(u, v)?, bf)),
             _ => None,
         }
     };
-    let (width, height) = measured.flow.size();
+    let (width, height) = matched.flow.size();
     let row = |v: usize| -> Vec<Option<f32>> {
         (0..width).map(|u| at(u, v).map(|velocity| velocity.vz().value() as f32)).collect()
     };

@@ -1,44 +1,94 @@
-//! φ by every method of the paper from one measured triple, and the best estimator's from its images.
+//! φ and VZ by every contender from three stereo frames: the paper's methods, and the library's pipeline.
 
+use serde::Serialize;
+
+use super::RealError;
+use super::contender::{ImageContender, ImageEstimator};
+use super::depth_velocity;
+use super::matching::MatchedFrames;
+use crate::synthetic::APPROACHES;
 use egomotion::estimate::alignment::Form;
 use egomotion::estimate::{MotionEstimate, Unsolvable};
-use egomotion::geometry::{StereoRig, Twist};
+use egomotion::geometry::{Field, StereoRig, Twist};
 use egomotion::observe::{DensePair, DepthChange, StereoFlow, StereoTrack};
 use egomotion::pipeline::PipelineError;
 use egomotion::pipeline::solve::Solver;
 use egomotion::pipeline::{Approach, Config, EstimatorKind, FrameMotion, Method, StereoFrame, StereoMotion};
 use egomotion::sim::StereoImages;
 
-use super::measured::Measured;
-use super::way::{Estimator, Way};
+/// Settings with which three frames are matched and φ is estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct MatchingSettings {
+    /// ROUND: levels of disparity in a pixel.
+    pub levels: u32,
+    /// φ is estimated from every n-th pixel in both directions.
+    pub sample_step_px: usize,
+    /// Seed of random choices.
+    pub seed: u64,
+}
 
-/// φ of the left camera by the paper's methods, each from every `step_px`-th pixel where it measures, least squares
+/// The answers of all contenders to three stereo frames.
+pub(super) struct ImageEstimates {
+    pub(super) matched: MatchedFrames,
+    /// φ of the left camera, maximum likelihood last; a contender that finds no motion is left out.
+    pub(super) motions: Vec<(ImageContender, MotionEstimate)>,
+    pipeline: FrameMotion,
+}
+
+impl ImageEstimates {
+    /// The answers to the frames at t−1, t and t+1.
+    pub(super) fn of(
+        frames: &[StereoImages; 3],
+        rig: &StereoRig,
+        settings: &MatchingSettings,
+    ) -> Result<Self, RealError> {
+        let matched = MatchedFrames::new(frames, rig, settings.levels as f32)?;
+        let [_, now, after] = frames;
+        let pipeline = by_pipeline(now, after, rig)?;
+        let mut motions = by_printed_methods(&matched, settings.sample_step_px, settings.seed);
+        motions.extend(pipeline.motion.as_ref().ok().map(|estimate| (ImageContender::BEST, *estimate)));
+        Ok(Self { matched, motions, pipeline })
+    }
+
+    /// The maps of VZ, in metres per frame.
+    pub(super) fn depth_velocities(&self) -> Vec<(ImageContender, Field)> {
+        depth_velocity::maps(&self.matched, &self.pipeline)
+    }
+}
+
+/// φ of the left camera by the paper's methods, each from every `step_px`-th pixel where it is matched, by least squares
 /// and least median of squares; no pixel is chosen with the help of the truth.
 ///
-/// A way that finds no motion is left out.
-pub fn printed_ways(measured: &Measured, step_px: usize, seed: u64) -> Vec<(Way, MotionEstimate)> {
-    let bf = measured.rig.depth_disparity_product();
-    let pair = measured.pair();
+/// A contender that finds no motion is left out.
+fn by_printed_methods(
+    matched: &MatchedFrames,
+    step_px: usize,
+    seed: u64,
+) -> Vec<(ImageContender, MotionEstimate)> {
+    let bf = matched.rig.depth_disparity_product();
+    let pair = matched.pair();
     let tracks = pair.every(step_px, DensePair::stereo_track);
     let changes: [Vec<DepthChange>; 2] = [
-        pair.every(step_px, |_, u, v| Some(measured.depth_flow(u, v)?.depth_change(bf))),
+        pair.every(step_px, |_, u, v| Some(matched.depth_flow(u, v)?.depth_change(bf))),
         pair.every(step_px, |pair, u, v| Some(pair.depth_track(u, v)?.depth_change(bf))),
     ];
     let flows: [Vec<StereoFlow>; 2] = [
-        pair.every(step_px, |_, u, v| measured.stereo_flow(u, v)),
+        pair.every(step_px, |_, u, v| matched.stereo_flow(u, v)),
         tracks.iter().map(StereoTrack::discrete_flow).collect(),
     ];
     let mut found = Vec::new();
-    let estimators = [(Estimator::Ls, EstimatorKind::Ls), (Estimator::Lmeds, EstimatorKind::Lmeds)];
+    let estimators = [(ImageEstimator::Ls, EstimatorKind::Ls), (ImageEstimator::Lmeds, EstimatorKind::Lmeds)];
     for (estimator, kind) in estimators {
         let config = Config { estimator: kind, seed, ..Config::default() };
         let still = Twist::zero();
-        let solver = Solver::new(&measured.rig, &still, &config);
+        let solver = Solver::new(&matched.rig, &still, &config);
         let mut add = |approach, method, answer: Result<MotionEstimate, Unsolvable>| {
             let known = answer.and_then(MotionEstimate::known);
-            found.extend(known.ok().map(|estimate| (Way::new(approach, method, estimator), estimate)));
+            found.extend(
+                known.ok().map(|estimate| (ImageContender::new(approach, method, estimator), estimate)),
+            );
         };
-        for (i, approach) in [Approach::Differential, Approach::Discrete].into_iter().enumerate() {
+        for (i, approach) in APPROACHES.into_iter().enumerate() {
             add(approach, Method::Dcce, solver.depth_change(&changes[i]));
             add(approach, Method::Dv, solver.binocular(&flows[i]));
         }
@@ -52,7 +102,7 @@ pub fn printed_ways(measured: &Measured, step_px: usize, seed: u64) -> Vec<(Way,
 ///
 /// # Errors
 /// [`PipelineError`] when the rig cannot measure.
-pub fn best(
+fn by_pipeline(
     before: &StereoImages,
     after: &StereoImages,
     rig: &StereoRig,

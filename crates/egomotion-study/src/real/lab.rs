@@ -1,24 +1,25 @@
-//! The manipulator's sequences through the whole image pipeline, judged by exact truth.
+//! The manipulator's sequences through the whole image pipeline, against exact truth.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-use super::measured::{Measured, Unmeasured};
-use super::record::{Draw, Record};
-use super::stage::Stage;
-use super::way::Way;
-use super::{depth_velocity, estimates, publish};
+use super::estimates::{ImageEstimates, MatchingSettings};
+use super::matching::MatchedFrames;
+use super::record::{DrawId, RealRecord};
+use super::rendered::RenderedSequence;
+use super::{RealError, publish};
 use crate::range::{OutOfRange, sequences, size, within};
+use crate::sequences::{owned, required};
 use crate::{Publication, Study};
-use egomotion::estimate::MotionEstimate;
-use egomotion::pipeline::PipelineError;
 use egomotion::sim::{Sequence, StereoImages};
 
-/// Tables 3 to 7 and Figures 11 to 14 on rendered images of lab-A … lab-M.
+/// The sequence whose images Figure 11 shows.
+const SHOWN_SEQUENCE: &str = "lab-G";
+
+/// `study real`: section 7.2, Tables 3 to 7 and Figures 11 to 14, on rendered images of lab-A … lab-M.
 ///
 /// A draw is three stereo frames at exp((k − s) φ), exp(k φ), exp((k + s) φ) for a reference pose k and the step s,
-/// with sensor noise of its own; a seed is a texture. What is matched in the images knows nothing of the truth.
+/// with sensor noise of its own; a seed is a texture. Matching knows nothing of the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LabStudy {
@@ -45,7 +46,7 @@ pub struct LabStudy {
 impl Default for LabStudy {
     fn default() -> Self {
         Self {
-            sequences: Sequence::lab_names().map(str::to_owned).collect(),
+            sequences: owned(Sequence::lab_names()),
             width_px: 320,
             height_px: 240,
             step: 1,
@@ -58,100 +59,69 @@ impl Default for LabStudy {
     }
 }
 
-/// Why there are no records.
-#[derive(Debug, Clone, PartialEq, Error)]
-pub enum RealError {
-    /// There is no such sequence, or the images have no pixels.
-    #[error("no sequence {name} of {width}x{height} pixels")]
-    Sequence {
-        /// Its name.
-        name: String,
-        /// Width asked for, in pixels.
-        width: usize,
-        /// Height asked for, in pixels.
-        height: usize,
-    },
-    /// The images are not of the rig's size.
-    #[error("the images are of {found:?} pixels, the rig of {expected:?}")]
-    Size {
-        /// (width, height) of the images.
-        found: (usize, usize),
-        /// (width, height) of the rig.
-        expected: (usize, usize),
-    },
-    /// Nothing could be measured.
-    #[error(transparent)]
-    Unmeasured(#[from] Unmeasured),
-    /// The pipeline refuses the rig.
-    #[error(transparent)]
-    Pipeline(#[from] PipelineError),
-}
-
 impl LabStudy {
     /// (sequence, seed) of each part.
-    pub(super) fn draws(&self) -> Vec<(&str, u64)> {
+    fn draws(&self) -> Vec<(&str, u64)> {
         let seeds = || (0..u64::from(self.seeds)).map(|i| self.first_seed.wrapping_add(i));
         self.sequences.iter().flat_map(|name| seeds().map(move |seed| (name.as_str(), seed))).collect()
     }
 
     /// The last reference pose.
-    fn reach(&self) -> i32 {
+    fn last_pose(&self) -> i32 {
         i32::try_from(self.poses).unwrap_or(i32::MAX)
     }
 
     /// The sequence of that name with the texture of that seed.
     fn sequence(&self, name: &str, seed: u64) -> Result<Sequence, RealError> {
-        let size = (self.width_px, self.height_px);
-        let unknown = || RealError::Sequence { name: name.to_owned(), width: size.0, height: size.1 };
-        let mut sequence = Sequence::named(name, Some(size), Some(2), 1.0).ok_or_else(unknown)?;
+        let mut sequence = required(name, Some((self.width_px, self.height_px)))?;
         sequence.scene = sequence.scene.with_texture(seed);
         Ok(sequence)
     }
 
-    /// Everything estimated with one texture, for all reference poses.
-    pub(super) fn draw(&self, name: &str, seed: u64) -> Result<Vec<Record>, RealError> {
-        let poses: Vec<i32> = (-self.reach()..=self.reach()).collect();
-        let stage = Stage::new(self.sequence(name, seed)?, seed, self.step, &poses);
-        let records: Result<Vec<Vec<Record>>, RealError> =
-            poses.par_iter().map(|&k| self.pose(&stage, k)).collect();
+    /// The records of one texture, for all reference poses.
+    fn draw(&self, name: &str, seed: u64) -> Result<Vec<RealRecord>, RealError> {
+        let poses: Vec<i32> = (-self.last_pose()..=self.last_pose()).collect();
+        let rendered = RenderedSequence::new(self.sequence(name, seed)?, seed, self.step, &poses);
+        let records: Result<Vec<Vec<RealRecord>>, RealError> =
+            poses.par_iter().map(|&k| self.pose(&rendered, k)).collect();
         Ok(records?.into_iter().flatten().collect())
     }
 
-    fn pose(&self, stage: &Stage, k: i32) -> Result<Vec<Record>, RealError> {
-        let rig = &stage.sequence.rig;
-        let draw = Draw { sequence: stage.sequence.name.clone(), pose: k.into(), seed: stage.seed };
-        let frames = stage.frames(k);
-        let measured = Measured::new(&frames, rig, self.levels as f32)?;
-        let [_, now, after] = &frames;
-        let best = estimates::best(now, after, rig)?;
-        let truth = stage.truth(k);
-
-        let mut ways = estimates::printed_ways(&measured, self.sample_step_px, stage.seed);
-        ways.extend(best.motion.as_ref().ok().map(|estimate| (Way::BEST, *estimate)));
-        let to_cyclopean = -rig.left_from_cyclopean();
-        let phi = |(way, estimate): &(Way, MotionEstimate)| {
-            draw.phi(*way, &estimate.seen_from(&to_cyclopean), &stage.motion())
+    fn pose(&self, rendered: &RenderedSequence, k: i32) -> Result<Vec<RealRecord>, RealError> {
+        let rig = &rendered.sequence.rig;
+        let draw = DrawId { sequence: rendered.sequence.name.clone(), pose: k.into(), seed: rendered.seed };
+        let settings = MatchingSettings {
+            levels: self.levels,
+            sample_step_px: self.sample_step_px,
+            seed: rendered.seed,
         };
-        let mut records: Vec<Record> = ways.iter().flat_map(phi).collect();
-        records.extend(truth.matching(&draw, &measured));
-        for (way, map) in depth_velocity::maps(&measured, &best) {
-            records.extend(truth.vz(&draw, way, &map));
+        let found = ImageEstimates::of(&rendered.frames(k), rig, &settings)?;
+        let truth = rendered.truth(k);
+
+        let to_cyclopean = -rig.left_from_cyclopean();
+        let phi = found.motions.iter().flat_map(|(contender, estimate)| {
+            draw.phi(*contender, &estimate.seen_from(&to_cyclopean), &rendered.motion())
+        });
+        let mut records: Vec<RealRecord> = phi.collect();
+        records.extend(truth.matching(&draw, &found.matched));
+        for (contender, map) in found.depth_velocities() {
+            records.extend(truth.vz(&draw, contender, &map));
         }
         Ok(records)
     }
 
-    /// The exposed frames t−1, t, t+1 at reference pose 0 of a sequence, and what is measured in them: Figure 11.
-    pub(super) fn example(&self, name: &str) -> Option<([StereoImages; 3], Measured)> {
-        let sequence = self.sequence(name, self.first_seed).ok()?;
+    /// The exposed frames t−1, t, t+1 at reference pose 0 of [`SHOWN_SEQUENCE`], and what is matched in them: Figure 11.
+    fn example(&self) -> Option<([StereoImages; 3], MatchedFrames)> {
+        let sequence = self.sequence(SHOWN_SEQUENCE, self.first_seed).ok()?;
         let rig = sequence.rig;
-        let frames = Stage::new(sequence, self.first_seed, self.step, &[0]).frames(0);
-        let measured = Measured::new(&frames, &rig, self.levels as f32).ok()?;
-        Some((frames, measured))
+        let frames = RenderedSequence::new(sequence, self.first_seed, self.step, &[0]).frames(0);
+        let matched = MatchedFrames::new(&frames, &rig, self.levels as f32).ok()?;
+        Some((frames, matched))
     }
 }
 
 impl Study for LabStudy {
-    type Record = Record;
+    type Record = RealRecord;
     type Error = RealError;
 
     fn name(&self) -> &'static str {
@@ -172,11 +142,11 @@ impl Study for LabStudy {
         self.draws().iter().map(|(name, seed)| format!("{name} seed {seed}")).collect()
     }
 
-    fn run(&self, part: usize) -> Result<Vec<Record>, RealError> {
+    fn run(&self, part: usize) -> Result<Vec<RealRecord>, RealError> {
         self.draws().get(part).map_or_else(|| Ok(Vec::new()), |(name, seed)| self.draw(name, *seed))
     }
 
-    fn publish(&self, records: &[Record]) -> Publication {
-        publish::lab(self, records)
+    fn publish(&self, records: &[RealRecord]) -> Publication {
+        publish::lab(self.example().as_ref(), records)
     }
 }

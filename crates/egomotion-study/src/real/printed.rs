@@ -1,38 +1,38 @@
-//! What the paper prints in Tables 2 to 7, to set beside what we measure.
+//! The values that the paper prints in Tables 3 to 7, which stand beside ours.
 //!
 //! Signs are ours: where Tables 3 and 6 print −VZ (E to M) the errors in percent are the same for either sign.
 
 /// VZ of one sequence in Table 3 or 6.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PrintedVz {
+pub(super) struct PrintedDepthVelocity {
     /// The sequence's letter.
-    pub letter: &'static str,
+    pub(super) letter: &'static str,
     /// (DCCE, DV) estimated −VZ in mm per frame; `None` where VZ varies from point to point.
-    pub estimated_mm: Option<[f64; 2]>,
+    pub(super) estimated_mm: Option<[f64; 2]>,
     /// True −VZ in mm per frame; that of M is printed as ≈5.
-    pub true_mm: Option<f64>,
+    pub(super) true_mm: Option<f64>,
     /// (DCCE, DV) ERM in percent.
-    pub erm_percent: [f64; 2],
+    pub(super) erm_percent: [f64; 2],
     /// (DCCE, DV) STD in percent.
-    pub std_percent: [f64; 2],
+    pub(super) std_percent: [f64; 2],
 }
 
 /// φ of one sequence, as (tX, tY, tZ) in mm and (ΩX, ΩY, ΩZ) in degrees per frame.
-pub type MmDeg = [f64; 6];
+pub(super) type MmDeg = [f64; 6];
 
 /// φ of one sequence by both methods in Table 4 or 5.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PrintedPhi {
+pub(super) struct PrintedMotion {
     /// The sequence's letter.
-    pub letter: &'static str,
+    pub(super) letter: &'static str,
     /// φ by DCCE.
-    pub dcce: MmDeg,
+    pub(super) dcce: MmDeg,
     /// φ by DV.
-    pub dv: MmDeg,
+    pub(super) dv: MmDeg,
 }
 
-const fn varying(letter: &'static str, erm_percent: [f64; 2], std_percent: [f64; 2]) -> PrintedVz {
-    PrintedVz { letter, estimated_mm: None, true_mm: None, erm_percent, std_percent }
+const fn varying(letter: &'static str, erm_percent: [f64; 2], std_percent: [f64; 2]) -> PrintedDepthVelocity {
+    PrintedDepthVelocity { letter, estimated_mm: None, true_mm: None, erm_percent, std_percent }
 }
 
 const fn constant(
@@ -41,12 +41,18 @@ const fn constant(
     truth: f64,
     erm_percent: [f64; 2],
     std_percent: [f64; 2],
-) -> PrintedVz {
-    PrintedVz { letter, estimated_mm: Some(estimated), true_mm: Some(truth), erm_percent, std_percent }
+) -> PrintedDepthVelocity {
+    PrintedDepthVelocity {
+        letter,
+        estimated_mm: Some(estimated),
+        true_mm: Some(truth),
+        erm_percent,
+        std_percent,
+    }
 }
 
 /// Table 3: VZ, differential approach.
-pub const TABLE_3: [PrintedVz; 12] = [
+pub(super) const TABLE_3: [PrintedDepthVelocity; 12] = [
     varying("A", [586.98, 3010.7], [1898.5, 8178.7]),
     varying("B", [216.85, 1573.8], [574.38, 5024.4]),
     varying("C", [290.18, 1698.0], [782.49, 4990.3]),
@@ -62,7 +68,7 @@ pub const TABLE_3: [PrintedVz; 12] = [
 ];
 
 /// Table 6: VZ, discrete approach.
-pub const TABLE_6: [PrintedVz; 12] = [
+pub(super) const TABLE_6: [PrintedDepthVelocity; 12] = [
     varying("A", [775.11, 2599.6], [2296.3, 6407.0]),
     varying("B", [376.49, 1011.5], [1012.6, 2550.2]),
     varying("C", [396.40, 751.63], [1012.9, 1806.6]),
@@ -77,14 +83,14 @@ pub const TABLE_6: [PrintedVz; 12] = [
     constant("M", [4.910, 6.705], 5.0, [-1.81, 34.10], [348.90, 327.04]),
 ];
 
-const fn phi(letter: &'static str, dcce: MmDeg, dv: MmDeg) -> PrintedPhi {
-    PrintedPhi { letter, dcce, dv }
+const fn phi(letter: &'static str, dcce: MmDeg, dv: MmDeg) -> PrintedMotion {
+    PrintedMotion { letter, dcce, dv }
 }
 
 /// Tables 4 (A to D) and 5 (E to M): φ, differential approach.
 ///
 /// tX of D by DCCE is printed "−222–20", which is read here as −222.20.
-pub const TABLES_4_5: [PrintedPhi; 12] = [
+pub(super) const TABLES_4_5: [PrintedMotion; 12] = [
     phi("A", [249.90, 15.01, 0.67, 0.041, -0.160, 0.069], [12.10, 2.79, -0.15, 0.074, -0.224, -0.038]),
     phi("B", [258.62, 57.05, -1.81, -0.018, -0.124, 16.936], [-24.81, -72.52, -5.49, -2.455, 0.860, -0.128]),
     phi("C", [-621.67, -99.28, 2.86, 0.842, 0.786, -16.819], [-10.76, -58.70, -4.26, -1.352, 0.208, 0.531]),
@@ -108,7 +114,7 @@ pub const TABLES_4_5: [PrintedPhi; 12] = [
 ];
 
 /// Table 7: φ, discrete approach, which is one estimate from (22).
-pub const TABLE_7: [(&str, MmDeg); 12] = [
+pub(super) const TABLE_7: [(&str, MmDeg); 12] = [
     ("A", [1.59, 1.52, 0.00, 0.200, -0.118, 0.017]),
     ("B", [0.97, -10.75, 7.99, -0.138, -0.323, -0.226]),
     ("C", [-17.66, 18.13, 233.35, 0.607, 1.395, 0.105]),

@@ -1,14 +1,14 @@
 //! The same comparison on a real recording whose camera poses are known.
 
 use nalgebra::Vector3;
-use serde::Serialize;
 
-use super::lab::RealError;
-use super::measured::Measured;
-use super::record::{Draw, Record};
-use super::way::{Quantity, Way};
-use super::{depth_velocity, estimates, publish};
+use super::estimates::{ImageEstimates, MatchingSettings};
+use super::matching::MatchedFrames;
+use super::quantity::Quantity;
+use super::record::{DrawId, RealRecord};
+use super::{RealError, publish};
 use crate::Publication;
+use crate::synthetic::APPROACHES;
 use egomotion::geometry::{Field, RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::Approach;
 use egomotion::sim::StereoImages;
@@ -21,18 +21,7 @@ pub struct Triple {
     /// True scene motion of the left camera, per interval, from t−1 to t and from t to t+1.
     pub motion: [Twist; 2],
     /// Name of the recording and index of the frame at t.
-    pub draw: Draw,
-}
-
-/// How the frames of a recording are measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Measuring {
-    /// ROUND: steps of disparity in a pixel.
-    pub levels: u32,
-    /// φ is estimated from every n-th pixel in both directions.
-    pub sample_step_px: usize,
-    /// Seed of random choices.
-    pub seed: u64,
+    pub draw: DrawId,
 }
 
 impl Triple {
@@ -50,34 +39,36 @@ impl Triple {
     ///
     /// # Errors
     /// [`RealError`] when the images differ in size or the rig cannot measure.
-    pub fn records(&self, rig: &StereoRig, how: &Measuring) -> Result<Vec<Record>, RealError> {
-        let [_, now, after] = &self.frames;
-        let (found, expected) = (now.left.size(), (rig.width_px, rig.height_px));
+    pub fn records(
+        &self,
+        rig: &StereoRig,
+        settings: &MatchingSettings,
+    ) -> Result<Vec<RealRecord>, RealError> {
+        let (found, expected) = (self.frames[1].left.size(), (rig.width_px, rig.height_px));
         if found != expected {
             return Err(RealError::Size { found, expected });
         }
-        let measured = Measured::new(&self.frames, rig, how.levels as f32)?;
-        let best = estimates::best(now, after, rig)?;
-        let mut ways = estimates::printed_ways(&measured, how.sample_step_px, how.seed);
-        ways.extend(best.motion.as_ref().ok().map(|estimate| (Way::BEST, *estimate)));
-        let phi = |(way, estimate): &(Way, _)| self.draw.phi(*way, estimate, &self.truth(way.approach));
-        let mut records: Vec<Record> = ways.iter().flat_map(phi).collect();
-        let still = [Approach::Differential, Approach::Discrete].map(|a| self.still_vz_mm(&measured, a));
-        for (way, map) in depth_velocity::maps(&measured, &best) {
-            let truth = &still[usize::from(way.approach == Approach::Discrete)];
-            let found = map.grid().values().iter().zip(truth.grid().values());
-            let pairs: Vec<(f64, f64)> = found.map(|(&e, &t)| (1e3 * f64::from(e), f64::from(t))).collect();
-            records.extend(self.draw.record(Some(way), Quantity::VzStill, &pairs));
+        let found = ImageEstimates::of(&self.frames, rig, settings)?;
+        let phi = found.motions.iter().flat_map(|(contender, estimate)| {
+            self.draw.phi(*contender, estimate, &self.truth(contender.approach))
+        });
+        let mut records: Vec<RealRecord> = phi.collect();
+        let still = APPROACHES.map(|approach| self.still_vz_mm(&found.matched, approach));
+        for (contender, map) in found.depth_velocities() {
+            let truth = &still[usize::from(contender.approach == Approach::Discrete)];
+            let values = map.grid().values().iter().zip(truth.grid().values());
+            let pairs: Vec<(f64, f64)> = values.map(|(&e, &t)| (1e3 * f64::from(e), f64::from(t))).collect();
+            records.extend(self.draw.record(Some(contender), Quantity::VzStill, &pairs));
         }
         Ok(records)
     }
 
-    /// VZ of a still scene under the true φ, in mm per interval, where depth was measured.
-    fn still_vz_mm(&self, measured: &Measured, approach: Approach) -> Field {
-        let rig = &measured.rig;
+    /// VZ of a still scene under the true φ, in mm per interval, where disparity was matched.
+    fn still_vz_mm(&self, matched: &MatchedFrames, approach: Approach) -> Field {
+        let rig = &matched.rig;
         let phi = self.truth(approach);
         let motion: RigidMotion = phi.exp();
-        let shift = &measured.disparity[1].shift;
+        let shift = &matched.disparity[1].shift;
         let mut vz = Field::missing(shift.width(), shift.height());
         for v in 0..shift.height() {
             for u in 0..shift.width() {
@@ -97,6 +88,6 @@ impl Triple {
 }
 
 /// Tables and figures of a recording's records.
-pub fn publish(name: &str, records: &[Record]) -> Publication {
+pub fn publish_recording(name: &str, records: &[RealRecord]) -> Publication {
     publish::recording(name, records)
 }

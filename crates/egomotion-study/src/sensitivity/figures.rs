@@ -1,30 +1,36 @@
-//! Figures 7, 8 and 9 in the paper's arrangement, and two of our own: estimators, and number of features.
+//! Figures 7, 8 and 9 in the paper's arrangement, and two of our own: by estimator, and by number of features.
 
-use super::{Baseline, Record, Sweep, value_name};
+use super::record::{SensitivityRecord, value_name};
+use super::sweep::{Baseline, Sweep};
 use crate::figure::Layout;
 use crate::{Axis, Content, Figure, Line, Panel, Point, Series};
 
-/// Errors below this, in percent, millimetres or degrees, are drawn here: exact answers leave rounding errors only.
+/// Least error that is drawn, in percent, millimetres or degrees; smaller ones are drawn there.
+///
+/// Exact answers leave rounding errors alone, which a logarithmic axis would stretch over many decades.
 const LEAST_DRAWN: f64 = 1e-4;
 
-/// Who draws one line: approach, method, estimator.
-type Who = (&'static str, &'static str, &'static str);
+/// Names of the contender that a line shows: approach, method, estimator.
+type ContenderNames = [&'static str; 3];
 
-/// The paper's four methods.
-const PAPER: [(&str, Who); 4] = [
-    ("DCCE DIFF", ("differential", "dcce", "ls")),
-    ("DV DIFF", ("differential", "dv", "ls")),
-    ("DCCE DISC", ("discrete", "dcce", "ls")),
-    ("DV DISC", ("discrete", "dv", "ls")),
+/// A line of a panel: its name in the legend, its quantity, its contender.
+type LineOf<'a> = (&'a str, &'a str, ContenderNames);
+
+/// The paper's four methods, by least squares.
+const PAPER: [(&str, ContenderNames); 4] = [
+    ("DCCE DIFF", ["differential", "dcce", "ls"]),
+    ("DV DIFF", ["differential", "dv", "ls"]),
+    ("DCCE DISC", ["discrete", "dcce", "ls"]),
+    ("DV DISC", ["discrete", "dv", "ls"]),
 ];
-/// What stands beside them in figures of φ.
-const BESIDE: [(&str, Who); 4] = [
-    ("(22) DISC", ("discrete", "linear22", "ls")),
-    ("ML DIFF", ("differential", "ml", "ml")),
-    ("ML DISC", ("discrete", "ml", "ml")),
-    ("bound DISC", ("discrete", "bound", "bound")),
+/// The lines beside the paper's four methods in figures of φ.
+const BESIDE: [(&str, ContenderNames); 4] = [
+    ("(22) DISC", ["discrete", "linear22", "ls"]),
+    ("ML DIFF", ["differential", "ml", "ml"]),
+    ("ML DISC", ["discrete", "ml", "ml"]),
+    ("bound DISC", ["discrete", "bound", "bound"]),
 ];
-/// The sweeps of Figures 7 to 9: heading, and the sweep that bears on each approach.
+/// The sweeps of Figures 7 to 9: heading, and the sweep of each approach, differential first.
 const SWEEPS: [(&str, [Sweep; 2]); 4] = [
     ("amplitude of velocity", [Sweep::Step, Sweep::Step]),
     ("disparity resolution", [Sweep::Round, Sweep::Round]),
@@ -33,40 +39,37 @@ const SWEEPS: [(&str, [Sweep; 2]); 4] = [
 ];
 
 /// All figures that the records have something for.
-pub(super) fn figures(sequences: &[String], records: &[Record]) -> Vec<Figure> {
+pub(super) fn all(sequences: &[String], records: &[SensitivityRecord]) -> Vec<Figure> {
     let mut figures = Vec::new();
     // The paper shows C.
     let ordered = sequences.iter().filter(|s| *s == "C").chain(sequences.iter().filter(|s| *s != "C"));
     for sequence in ordered {
         for baseline in [Baseline::Real, Baseline::Clean] {
-            let plot = Plots { records, sequence, baseline };
+            let plot = SweepPlots { records, sequence, baseline };
             figures.extend([plot.figure_7(), plot.figure_8(), plot.figure_9()]);
         }
-        let plot = Plots { records, sequence, baseline: Baseline::Real };
+        let plot = SweepPlots { records, sequence, baseline: Baseline::Real };
         figures.extend([plot.estimators(), plot.features()]);
     }
-    figures.retain(|figure| figure.panels.iter().any(has_a_line));
+    figures.retain(Figure::has_a_line);
     figures
 }
 
-fn has_a_line(panel: &Panel) -> bool {
-    matches!(&panel.content, Content::Plot { series, .. } if !series.is_empty())
-}
-
-struct Plots<'a> {
-    records: &'a [Record],
+/// The records of one sequence at one baseline, from which its figures are drawn.
+struct SweepPlots<'a> {
+    records: &'a [SensitivityRecord],
     sequence: &'a str,
     baseline: Baseline,
 }
 
-impl Plots<'_> {
+impl SweepPlots<'_> {
     fn figure_7(&self) -> Figure {
         let panels = SWEEPS.iter().zip('a'..).map(|((name, sweeps), letter)| {
-            let mut lines: Vec<(&str, &str, Who)> =
-                PAPER.iter().map(|(name, who)| (*name, "vz", *who)).collect();
+            let mut lines: Vec<LineOf<'_>> =
+                PAPER.iter().map(|(name, contender)| (*name, "vz", *contender)).collect();
             lines.extend([
-                ("ML DIFF, via φ", "vz_phi", ("differential", "ml", "ml")),
-                ("ML DISC, via φ", "vz_phi", ("discrete", "ml", "ml")),
+                ("ML DIFF, via φ", "vz_phi", ["differential", "ml", "ml"]),
+                ("ML DISC, via φ", "vz_phi", ["discrete", "ml", "ml"]),
             ]);
             self.panel(&format!("({letter}) {name}"), "VZ", *sweeps, &lines)
         });
@@ -113,8 +116,11 @@ impl Plots<'_> {
         of_sweep
             .zip('a'..)
             .map(|((name, sweeps, heading, quantity), letter)| {
-                let lines: Vec<_> =
-                    PAPER.iter().chain(&BESIDE).map(|(name, who)| (*name, quantity, *who)).collect();
+                let lines: Vec<_> = PAPER
+                    .iter()
+                    .chain(&BESIDE)
+                    .map(|(name, contender)| (*name, quantity, *contender))
+                    .collect();
                 self.panel(&format!("({letter}) {heading}, {name}"), heading, *sweeps, &lines)
             })
             .collect()
@@ -133,12 +139,12 @@ impl Plots<'_> {
             ("rigid DISC", "discrete", "rigid"),
         ];
         let panels = methods.iter().zip('a'..).map(|((heading, approach, method), letter)| {
-            let lines: Vec<(&str, &str, Who)> = vec![
-                ("LS", "tz", (approach, method, "ls")),
-                ("LMedS", "tz", (approach, method, "lmeds")),
-                ("IRLS", "tz", (approach, method, "irls")),
-                ("ML", "tz", (approach, "ml", "ml")),
-                ("bound", "tz", (approach, "bound", "bound")),
+            let lines: Vec<LineOf<'_>> = vec![
+                ("LS", "tz", [approach, method, "ls"]),
+                ("LMedS", "tz", [approach, method, "lmeds"]),
+                ("IRLS", "tz", [approach, method, "irls"]),
+                ("ML", "tz", [approach, "ml", "ml"]),
+                ("bound", "tz", [approach, "bound", "bound"]),
             ];
             self.panel(&format!("({letter}) {heading}"), "tZ", [Sweep::Round; 2], &lines)
         });
@@ -158,8 +164,8 @@ impl Plots<'_> {
     fn features(&self) -> Figure {
         let quantities = [("VZ via φ", "vz_phi"), ("tZ", "tz"), ("ΩX", "wx"), ("ΩY", "wy")];
         let panels = quantities.iter().zip('a'..).map(|((heading, quantity), letter)| {
-            let all = PAPER.iter().chain(&BESIDE).filter(|(_, who)| who.0 == "discrete");
-            let lines: Vec<_> = all.map(|(name, who)| (*name, *quantity, *who)).collect();
+            let all = PAPER.iter().chain(&BESIDE).filter(|(_, contender)| contender[0] == "discrete");
+            let lines: Vec<_> = all.map(|(name, contender)| (*name, *quantity, *contender)).collect();
             self.panel(&format!("({letter}) {heading}"), heading, [Sweep::Features; 2], &lines)
         });
         let panels: Vec<Panel> = panels.collect();
@@ -175,21 +181,21 @@ impl Plots<'_> {
         }
     }
 
-    fn panel(&self, title: &str, quantity: &str, sweeps: [Sweep; 2], lines: &[(&str, &str, Who)]) -> Panel {
-        let relative = |(_, quantity, _): &(&str, &str, Who)| {
-            self.records.iter().find(|r| r.score.quantity == *quantity && r.sequence == self.sequence)
+    fn panel(&self, title: &str, quantity: &str, sweeps: [Sweep; 2], lines: &[LineOf<'_>]) -> Panel {
+        let relative = |(_, quantity, _): &LineOf<'_>| {
+            self.records.iter().find(|r| r.errors.quantity == *quantity && r.sequence == self.sequence)
         };
-        let figures = lines.iter().find_map(relative).and_then(|r| r.score.tally.figures());
-        let error = match (figures.is_none_or(|f| f.erm_abs.is_some()), quantity.starts_with('Ω')) {
+        let found = lines.iter().find_map(relative).and_then(|r| r.errors.tally.statistics());
+        let error = match (found.is_none_or(|f| f.erm_abs.is_some()), quantity.starts_with('Ω')) {
             (true, _) => "ERM (%)",
             (false, true) => "EAM (°)",
             (false, false) => "EAM (mm)",
         };
-        let series = lines.iter().filter_map(|(name, quantity, who)| {
-            let points = self.points(sweeps[usize::from(who.0 == "discrete")], quantity, *who);
-            let line = match who {
-                (_, "bound", _) => Line::Reference,
-                ("discrete", ..) => Line::Dashed,
+        let series = lines.iter().filter_map(|(name, quantity, contender)| {
+            let points = self.points(sweeps[usize::from(contender[0] == "discrete")], quantity, *contender);
+            let line = match contender {
+                [_, "bound", _] => Line::Reference,
+                ["discrete", ..] => Line::Dashed,
                 _ => Line::Solid,
             };
             (!points.is_empty()).then(|| Series { name: (*name).to_owned(), line, points })
@@ -202,23 +208,22 @@ impl Plots<'_> {
         Panel { title: title.to_owned(), content }
     }
 
-    fn points(&self, sweep: Sweep, quantity: &str, (approach, method, estimator): Who) -> Vec<Point> {
-        let of = |(place, value): (usize, &f64)| {
-            let value_is = value_name(*value);
+    fn points(&self, sweep: Sweep, quantity: &str, contender: ContenderNames) -> Vec<Point> {
+        let point = |(place, value): (usize, &f64)| {
+            let value = value_name(*value);
             let record = self.records.iter().find(|r| {
                 r.sequence == self.sequence
                     && r.baseline == self.baseline.name()
                     && r.sweep == sweep.name()
-                    && r.value == value_is
-                    && r.score.quantity == quantity
-                    && (r.score.approach == approach && r.score.method == method)
-                    && r.score.estimator == estimator
+                    && r.value == value
+                    && r.errors.quantity == quantity
+                    && r.errors.contender() == contender
             })?;
-            let figures = record.score.tally.figures()?;
-            let (x, y) = (place as f64, figures.erm_abs.unwrap_or(figures.eam).max(LEAST_DRAWN));
-            Some(Point { x, y, standard_error: figures.standard_error })
+            let found = record.errors.tally.statistics()?;
+            let (x, y) = (place as f64, found.mean_error().max(LEAST_DRAWN));
+            Some(Point { x, y, standard_error: found.standard_error })
         };
-        sweep.values().iter().enumerate().filter_map(of).collect()
+        sweep.values().iter().enumerate().filter_map(point).collect()
     }
 }
 

@@ -3,19 +3,34 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::STEPS;
-use super::exact::{Exact, Noise};
-use crate::world::World;
-use crate::{Axis, Cell, Content, Figure, Line, Panel, Point, Series, Table};
+use super::pixel::{ExactPixel, PixelNoise};
+use crate::sequences::PAPER_STEPS;
+use crate::synthetic::SyntheticWorld;
+use crate::{Axis, Cell, Content, Figure, Line, Panel, Series, Table};
 use egomotion::motion::depth_velocity as vz;
+use egomotion::pipeline::Approach;
 use egomotion::sim::{Part, Scene, Sequence, Shape};
 
+/// Depth of the centre of the paper's sphere (7.1) at its nearest, in metres.
+const NEAREST_M: f64 = 2.5;
+/// Distance from one depth of the sphere's centre to the next, in metres.
+const DEPTH_STEP_M: f64 = 0.25;
+/// Steps of depth: up to 5 m.
+const DEPTH_STEPS: i32 = 10;
+/// Largest multiple of the motion; beyond, the sphere leaves the image.
+const LARGEST_STEP: f64 = 16.0;
+/// Place of the sphere's centre to the side and down, in metres, and its radius.
+const SPHERE_X_Y_RADIUS_M: [f64; 3] = [-0.35, 0.30, 0.40];
+/// Grey level of the sphere; nothing is rendered of it, so that any value serves.
+const SPHERE_GREY: f64 = 185.0;
+
 /// The four methods, numbered as in (53).
-pub const METHODS: [&str; 4] = ["DCCE differential", "DV differential", "DCCE discrete", "DV discrete"];
+pub(super) const METHODS: [&str; 4] =
+    ["DCCE differential", "DV differential", "DCCE discrete", "DV discrete"];
 
 /// Variance of VZ by the four methods at one point, in m².
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Variances {
+pub(super) struct Variances {
     /// (39), (44), (47) and (50), with σ²_di = ½ σ²_d for all derivatives as section 5.6 takes it.
     pub printed: [f64; 4],
     /// (39c), (44), (47c) and (50).
@@ -24,10 +39,9 @@ pub struct Variances {
 
 impl Variances {
     /// At one point; `bf` is b f.
-    pub fn of(at: &Exact, noise: &Noise, bf: f64) -> Self {
+    pub(super) fn of(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Self {
         let (flow, track) = (at.depth_flow(noise), at.depth_track(noise));
-        let mut halved = track.as_printed();
-        halved.disparity.cov[(3, 3)] = 0.5 * track.disparity.cov[(0, 0)];
+        let halved = at.depth_track_as_in_5_6(noise);
         let dv = vz::dv(&at.stereo_flow(noise), bf).vz().variance();
         let dv_discrete = vz::dv_discrete(&at.stereo_track(noise), bf).vz().variance();
         Self {
@@ -47,7 +61,7 @@ impl Variances {
     }
 }
 
-/// What changes along a series of coefficients.
+/// The quantity that changes along a series of coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Swept {
     /// The sphere's depth, at the sequence's own motion.
@@ -59,7 +73,7 @@ pub enum Swept {
 /// Coefficients of (53), means over the sphere; in mm² per px².
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Coefficients {
-    /// Which series it belongs to.
+    /// The series to which it belongs.
     pub swept: Swept,
     /// Multiple of the motion.
     pub step: f64,
@@ -71,37 +85,35 @@ pub struct Coefficients {
     pub pixels: usize,
     /// As printed: (Coef_disp, Coef_vel) of the four methods.
     pub printed: [(f64, f64); 4],
-    /// Of the corrected formulas.
+    /// The same of the corrected formulas.
     pub corrected: [(f64, f64); 4],
 }
 
-/// Depths of the sphere's centre, in metres: the nearest, and the distance between two.
-const NEAR_M: f64 = 2.5;
-const DEPTH_STEP_M: f64 = 0.25;
-
 /// The paper's sphere, moved from 2.5 to 5 m under the sequence's motion.
-pub fn over_depth(sequence: &Sequence) -> Vec<Coefficients> {
-    let at = |i: i32| of_sphere(sequence, Swept::Depth, NEAR_M + DEPTH_STEP_M * f64::from(i), 1.0);
-    (0..=10).filter_map(at).collect()
+pub(super) fn over_depth(sequence: &Sequence) -> Vec<Coefficients> {
+    let at = |i: i32| of_sphere(sequence, Swept::Depth, NEAREST_M + DEPTH_STEP_M * f64::from(i), 1.0);
+    (0..=DEPTH_STEPS).filter_map(at).collect()
 }
 
 /// The sphere at 2.5 m under 1 to 16 times the sequence's motion; beyond, it leaves the image.
-pub fn over_speed(sequence: &Sequence) -> Vec<Coefficients> {
-    let steps = STEPS.iter().filter(|&&step| step <= 16.0);
-    steps.filter_map(|&step| of_sphere(sequence, Swept::Step, NEAR_M, step)).collect()
+pub(super) fn over_speed(sequence: &Sequence) -> Vec<Coefficients> {
+    let steps = PAPER_STEPS.iter().filter(|&&step| step <= LARGEST_STEP);
+    steps.filter_map(|&step| of_sphere(sequence, Swept::Step, NEAREST_M, step)).collect()
 }
 
 /// `None` where no pixel of the sphere is usable.
 fn of_sphere(sequence: &Sequence, swept: Swept, depth_m: f64, step: f64) -> Option<Coefficients> {
-    let part = Part { shape: Shape::sphere([-0.35, 0.30, depth_m], 0.40), grey: 185.0, tile_m: 0.0 };
+    let [x_m, y_m, radius_m] = SPHERE_X_Y_RADIUS_M;
+    let sphere = Shape::sphere([x_m, y_m, depth_m], radius_m);
+    let part = Part { shape: sphere, grey: SPHERE_GREY, tile_m: 0.0 };
     let scene = Scene::new(vec![part], Vector3::new(-0.6, -2.0, 0.8), 0.3, 2003);
-    let world = &World::new(&scene, &sequence.rig, &sequence.phi_cyclopean(0)?, 0, step);
+    let world = &SyntheticWorld::new(&scene, &sequence.rig, &sequence.phi_cyclopean(0)?, 0, step);
     let bf = world.rig.depth_disparity_product();
-    let usable = world.pixels().iter().filter(|pixel| pixel.differential);
-    let points: Vec<Exact> = usable.filter_map(|pixel| Exact::at(world, pixel.index)).collect();
+    let usable = world.usable_in(Approach::Differential);
+    let points: Vec<ExactPixel> = usable.filter_map(|pixel| ExactPixel::at(world, pixel.index)).collect();
     let mut sums = [[(0.0, 0.0); 4]; 2];
     for point in &points {
-        let unit = |disparity_px, flow_px| Variances::of(point, &Noise { disparity_px, flow_px }, bf);
+        let unit = |disparity_px, flow_px| Variances::of(point, &PixelNoise { disparity_px, flow_px }, bf);
         let (by_disparity, by_flow) = (unit(1.0, 0.0), unit(0.0, 1.0));
         let pairs = [(by_disparity.printed, by_flow.printed), (by_disparity.corrected, by_flow.corrected)];
         for (sum, (disparity, flow)) in sums.iter_mut().zip(pairs) {
@@ -125,29 +137,30 @@ fn of_sphere(sequence: &Sequence, swept: Swept, depth_m: f64, step: f64) -> Opti
 }
 
 /// A coefficient's name, `Coef1_disp`, and how to read it from (Coef_disp, Coef_vel) of the methods.
-type Named = (&'static str, usize, fn((f64, f64)) -> f64);
+type NamedCoefficient = (&'static str, usize, fn((f64, f64)) -> f64);
 
 /// The coefficients of all four methods, printed or corrected.
-type All = fn(&Coefficients) -> &[(f64, f64); 4];
+type OfMethods = fn(&Coefficients) -> &[(f64, f64); 4];
 
 /// Those of the paper's Figure 6(a), which grow strongly with depth.
-const STRONG: [Named; 4] = [
+const STRONG: [NamedCoefficient; 4] = [
     ("Coef1_disp", 0, |c| c.0),
     ("Coef2_vel", 1, |c| c.1),
     ("Coef3_disp", 2, |c| c.0),
     ("Coef4_disp", 3, |c| c.0),
 ];
 /// Those of its Figure 6(b); Coef4_vel is zero.
-const WEAK: [Named; 3] = [("Coef1_vel", 0, |c| c.1), ("Coef2_disp", 1, |c| c.0), ("Coef3_vel", 2, |c| c.1)];
+const WEAK: [NamedCoefficient; 3] =
+    [("Coef1_vel", 0, |c| c.1), ("Coef2_disp", 1, |c| c.0), ("Coef3_vel", 2, |c| c.1)];
 
 fn of<'a>(found: &[&'a Coefficients], swept: Swept) -> Vec<&'a Coefficients> {
     found.iter().copied().filter(|c| c.swept == swept).collect()
 }
 
 /// Figure 6.
-pub fn figure(found: &[&Coefficients]) -> Figure {
+pub(super) fn figure(found: &[&Coefficients]) -> Figure {
     let found = &of(found, Swept::Depth);
-    let panel = |title: &str, named: &[Named], all: All| Panel {
+    let panel = |title: &str, named: &[NamedCoefficient], all: OfMethods| Panel {
         title: title.to_owned(),
         content: Content::Plot {
             x: Axis::linear("depth of the sphere (m)"),
@@ -164,8 +177,8 @@ pub fn figure(found: &[&Coefficients]) -> Figure {
         caption:
             "Variance of VZ = Coef_disp σ²_d + Coef_vel σ²_v, mean over the sphere's usable pixels while \
                   its centre moves from 2.5 to 5 m under the motion of sequence C. 1 DCCE differential, 2 DV \
-                  differential, 3 DCCE discrete, 4 DV discrete. Of the discrete DCCE, Coef_vel weighs the \
-                  variance of one component of the displacement, σ²_x + σ²_x′; of the discrete DV it is \
+                  differential, 3 DCCE discrete, 4 DV discrete. For the discrete DCCE, Coef_vel weighs the \
+                  variance of one component of the displacement, σ²_x + σ²_x′; for the discrete DV it is \
                   zero. The printed coefficients take σ²_di = ½ σ²_d for d_t of the discrete form too; the \
                   corrected ones, of (39c) and (47c), have its 2 σ²_d and the shared disparity."
                 .to_owned(),
@@ -180,12 +193,11 @@ pub fn figure(found: &[&Coefficients]) -> Figure {
 }
 
 fn series(name: &str, found: &[&Coefficients], value: impl Fn(&Coefficients) -> f64) -> Series {
-    let point = |c: &&Coefficients| Point { x: c.depth_m, y: value(c), standard_error: None };
-    Series { name: name.to_owned(), line: Line::Solid, points: found.iter().map(point).collect() }
+    Series::through(name, Line::Solid, found.iter().map(|c| (c.depth_m, value(c))))
 }
 
 /// Every coefficient at every depth.
-pub fn data(found: &[&Coefficients]) -> Table {
+pub(super) fn data(found: &[&Coefficients]) -> Table {
     let mut table = Table::new(
         "coefficients",
         "Coefficients of (53) against depth and speed",
@@ -215,7 +227,7 @@ pub fn data(found: &[&Coefficients]) -> Table {
 }
 
 /// How fast each coefficient grows with depth, and with speed.
-pub fn table(found: &[&Coefficients]) -> Table {
+pub(super) fn table(found: &[&Coefficients]) -> Table {
     let mut table = Table::new(
         "coefficients-growth",
         "Growth of the coefficients of (53) with depth and with speed",
@@ -232,7 +244,7 @@ pub fn table(found: &[&Coefficients]) -> Table {
             ("fast", "STEP 16 (mm²/px²)"),
         ],
     );
-    let kinds: [(&str, All); 2] = [("printed", |c| &c.printed), ("corrected", |c| &c.corrected)];
+    let kinds: [(&str, OfMethods); 2] = [("printed", |c| &c.printed), ("corrected", |c| &c.corrected)];
     let (depths, steps) = (of(found, Swept::Depth), of(found, Swept::Step));
     for (kind, all) in kinds {
         for (name, method, read) in STRONG.iter().chain(&WEAK) {

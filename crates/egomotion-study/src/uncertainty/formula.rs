@@ -1,14 +1,16 @@
-//! The variance formulas of section 5, each with the estimator that it speaks of and the inputs that this
-//! estimator meets.
+//! The variance formulas of section 5, each with its estimator and the noisy inputs of this estimator.
 
 use nalgebra::{Vector2, Vector4};
 use serde::{Deserialize, Serialize};
 
-use super::exact::{Exact, Noise, Stencil};
-use super::monte_carlo::Noisy;
+use super::monte_carlo::NoisyFunction;
+use super::pixel::{ExactPixel, PixelNoise, Stencil};
 use egomotion::geometry::Gaussian;
 use egomotion::motion::depth_velocity as vz;
 use egomotion::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
+
+/// Square millimetres in a square metre.
+const MM2_PER_M2: f64 = 1e6;
 
 /// An estimator with the formulas for its variance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,9 +31,9 @@ pub enum Family {
     Rounding,
 }
 
-/// What a predicted variance is.
+/// The terms that a predicted variance holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Kind {
+pub enum FormulaKind {
     /// As the paper prints it.
     Printed,
     /// Every input's noise to first order, shared disparity accounted for, without products of noises.
@@ -42,7 +44,7 @@ pub enum Kind {
     SecondOrder,
 }
 
-/// Which inputs are drawn.
+/// The inputs that are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Inputs {
     /// The raw disparities and flows, as the estimator meets them.
@@ -54,20 +56,20 @@ pub enum Inputs {
 type Function = Box<dyn Fn(&[f64]) -> f64 + Send + Sync>;
 
 /// One estimator at one point, with its noise and the variances predicted for it.
-pub struct Experiment {
-    /// What is estimated: `Z`, `Zx`, `VZ`, …
+pub(super) struct Experiment {
+    /// The quantity that is estimated: `Z`, `Zx`, `VZ`, …
     pub quantity: &'static str,
-    /// Which inputs are drawn.
+    /// The inputs that are drawn.
     pub inputs: Inputs,
     /// The estimator as a function of these inputs; depths in millimetres.
-    pub noisy: Noisy<Function>,
+    pub noisy: NoisyFunction<Function>,
     /// (formula, kind, variance in mm²).
-    pub predictions: Vec<(&'static str, Kind, f64)>,
+    pub predictions: Vec<(&'static str, FormulaKind, f64)>,
 }
 
 impl Family {
     /// All, in the paper's order.
-    pub const ALL: [Self; 7] = [
+    pub(super) const ALL: [Self; 7] = [
         Self::Depth,
         Self::Gradient,
         Self::DcceDifferential,
@@ -78,7 +80,7 @@ impl Family {
     ];
 
     /// Name with the numbers of its formulas.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Self::Depth => "depth (32)",
             Self::Gradient => "gradient (35)",
@@ -91,12 +93,12 @@ impl Family {
     }
 
     /// Whether it needs one surface at t − 1 too.
-    pub fn differential(self) -> bool {
+    pub(super) fn differential(self) -> bool {
         matches!(self, Self::Gradient | Self::DcceDifferential | Self::DvDifferential)
     }
 
     /// Its experiments at one point; none for [`Family::Rounding`], which rounds and so has no derivatives.
-    pub fn experiments(self, at: &Exact, noise: &Noise, bf: f64) -> Vec<Experiment> {
+    pub(super) fn experiments(self, at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Vec<Experiment> {
         match self {
             Self::Depth => vec![depth(at, noise, bf)],
             Self::Gradient => gradients(at, noise, bf),
@@ -111,23 +113,22 @@ impl Family {
     }
 }
 
-/// Square millimetres of a square metre.
-const MM2: f64 = 1e6;
-
 fn experiment(
     quantity: &'static str,
     inputs: Inputs,
     values: impl IntoIterator<Item = (f64, f64)>,
     estimate_m: impl Fn(&[f64]) -> f64 + Send + Sync + 'static,
-    variances_m2: &[(&'static str, Kind, f64)],
+    variances_m2: &[(&'static str, FormulaKind, f64)],
 ) -> Experiment {
     let function: Function = Box::new(move |x| 1e3 * estimate_m(x));
-    let noisy = Noisy::new(values, function);
-    let mut predictions: Vec<_> =
-        variances_m2.iter().map(|&(formula, kind, variance)| (formula, kind, MM2 * variance)).collect();
-    // Second order belongs to what the inputs are, so it has no formula of its own.
+    let noisy = NoisyFunction::new(values, function);
+    let mut predictions: Vec<_> = variances_m2
+        .iter()
+        .map(|&(formula, kind, variance)| (formula, kind, MM2_PER_M2 * variance))
+        .collect();
+    // Second order belongs to the inputs, so it has no formula of its own.
     let formula = variances_m2.last().map_or("", |last| last.0);
-    predictions.push((formula, Kind::SecondOrder, noisy.second_order()));
+    predictions.push((formula, FormulaKind::SecondOrder, noisy.second_order()));
     Experiment { quantity, inputs, noisy, predictions }
 }
 
@@ -154,7 +155,7 @@ fn exact<const N: usize>(mean: [f64; N]) -> Gaussian<N> {
     Gaussian::independent(mean, [0.0; N])
 }
 
-fn depth(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
+fn depth(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Experiment {
     let variance = vz::dv(&at.stereo_flow(noise), bf).z_vz.cov[(0, 0)];
     let estimate = move |x: &[f64]| {
         vz::dv(&StereoFlow { x_px: 0.0, y_px: 0.0, measured: exact([input(x, 0), 0.0, 0.0, 0.0]) }, bf)
@@ -168,7 +169,7 @@ fn depth(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
         Inputs::Raw,
         values,
         estimate,
-        &[("(32)", Kind::Printed, variance), ("(32)", Kind::Corrected, variance)],
+        &[("(32)", FormulaKind::Printed, variance), ("(32)", FormulaKind::Corrected, variance)],
     )
 }
 
@@ -181,14 +182,14 @@ fn raw_depth_change(x: &[f64], bf: f64) -> DepthChange {
     DepthFlow { x_px: 0.0, y_px: 0.0, disparity, flow }.depth_change(bf)
 }
 
-fn raw_inputs(at: &Exact, noise: &Noise) -> Vec<(f64, f64)> {
+fn raw_inputs(at: &ExactPixel, noise: &PixelNoise) -> Vec<(f64, f64)> {
     let times = [at.before, at.after.centre];
     with(disparities(&at.now).into_iter().chain(times), noise.disparity_px)
         .chain(with(at.flow, noise.flow_px))
         .collect()
 }
 
-fn gradients(at: &Exact, noise: &Noise, bf: f64) -> Vec<Experiment> {
+fn gradients(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Vec<Experiment> {
     let change = at.depth_flow(noise).depth_change(bf);
     let one = |(quantity, i): (&'static str, usize)| {
         let variance = change.depth.cov[(i, i)];
@@ -197,19 +198,19 @@ fn gradients(at: &Exact, noise: &Noise, bf: f64) -> Vec<Experiment> {
             Inputs::Raw,
             raw_inputs(at, noise),
             move |x| raw_depth_change(x, bf).depth.mean[i],
-            &[("(35)", Kind::Printed, variance), ("(35)", Kind::Corrected, variance)],
+            &[("(35)", FormulaKind::Printed, variance), ("(35)", FormulaKind::Corrected, variance)],
         )
     };
     [("Zx", 1), ("Zy", 2), ("Zt", 3)].map(one).into()
 }
 
-fn dcce_differential(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
+fn dcce_differential(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Experiment {
     let flow = at.depth_flow(noise);
     let change = flow.depth_change(bf);
     let variances = [
-        ("(39)", Kind::Printed, vz::dcce_variance_as_printed(&flow, bf)),
-        ("(39c)", Kind::FirstOrder, vz::dcce(&change).vz().variance()),
-        ("(39c+)", Kind::Corrected, vz::dcce_variance_with_product(&change)),
+        ("(39)", FormulaKind::Printed, vz::dcce_variance_as_printed(&flow, bf)),
+        ("(39c)", FormulaKind::FirstOrder, vz::dcce(&change).vz().variance()),
+        ("(39c+)", FormulaKind::Corrected, vz::dcce_variance_with_product(&change)),
     ];
     let estimate = move |x: &[f64]| vz::dcce(&raw_depth_change(x, bf)).vz().value();
     experiment("VZ", Inputs::Raw, raw_inputs(at, noise), estimate, &variances)
@@ -230,14 +231,14 @@ fn independent_inputs(flow: &DepthFlow) -> Vec<(f64, f64)> {
     [d; 3].into_iter().chain(gradient).chain(v).collect()
 }
 
-fn dcce_independent(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
+fn dcce_independent(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Experiment {
     let flow = at.depth_flow(noise);
-    let printed = [("(39)", Kind::Printed, vz::dcce_variance_as_printed(&flow, bf))];
+    let printed = [("(39)", FormulaKind::Printed, vz::dcce_variance_as_printed(&flow, bf))];
     let estimate = move |x: &[f64]| independent_change(x, bf);
     experiment("VZ", Inputs::Independent, independent_inputs(&flow), estimate, &printed)
 }
 
-fn dv_differential(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
+fn dv_differential(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Experiment {
     let variance = vz::dv(&at.stereo_flow(noise), bf).vz().variance();
     let values =
         with([at.now.centre], noise.disparity_px).chain(with([at.flow[0], at.flow_right_x], noise.flow_px));
@@ -250,21 +251,19 @@ fn dv_differential(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
         Inputs::Raw,
         values,
         estimate,
-        &[("(44)", Kind::Printed, variance), ("(44)", Kind::Corrected, variance)],
+        &[("(44)", FormulaKind::Printed, variance), ("(44)", FormulaKind::Corrected, variance)],
     )
 }
 
-fn dcce_discrete(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
+fn dcce_discrete(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Experiment {
     let track = at.depth_track(noise);
     let change = track.depth_change(bf);
-    // Section 5.6 takes σ²_di = ½ σ²_d for every derivative; of d′ − d that is a quarter of the truth.
-    let mut halved = track.as_printed();
-    halved.disparity.cov[(3, 3)] = 0.5 * track.disparity.cov[(0, 0)];
+    let halved = at.depth_track_as_in_5_6(noise);
     let variances = [
-        ("(47) with σ²_dt = ½σ²_d", Kind::Printed, vz::dcce_variance_as_printed(&halved, bf)),
-        ("(47)", Kind::Printed, vz::dcce_discrete_variance_as_printed(&track, bf)),
-        ("(47c)", Kind::FirstOrder, vz::dcce(&change).vz().variance()),
-        ("(47c+)", Kind::Corrected, vz::dcce_variance_with_product(&change)),
+        ("(47) with σ²_dt = ½σ²_d", FormulaKind::Printed, vz::dcce_variance_as_printed(&halved, bf)),
+        ("(47)", FormulaKind::Printed, vz::dcce_discrete_variance_as_printed(&track, bf)),
+        ("(47c)", FormulaKind::FirstOrder, vz::dcce(&change).vz().variance()),
+        ("(47c+)", FormulaKind::Corrected, vz::dcce_variance_with_product(&change)),
     ];
     let values = with([at.now.centre].into_iter().chain(disparities(&at.after)), noise.disparity_px)
         .chain(with(at.displacement, noise.flow_px));
@@ -278,20 +277,20 @@ fn dcce_discrete(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
     experiment("VZ", Inputs::Raw, values, estimate, &variances)
 }
 
-fn dcce_discrete_independent(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
+fn dcce_discrete_independent(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Experiment {
     let track = at.depth_track(noise);
-    let printed = [("(47)", Kind::Printed, vz::dcce_discrete_variance_as_printed(&track, bf))];
+    let printed = [("(47)", FormulaKind::Printed, vz::dcce_discrete_variance_as_printed(&track, bf))];
     let estimate = move |x: &[f64]| independent_change(x, bf);
     experiment("VZ", Inputs::Independent, independent_inputs(&track.as_printed()), estimate, &printed)
 }
 
-fn dv_discrete(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
+fn dv_discrete(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Experiment {
     let track = at.stereo_track(noise);
     let variance = vz::dv_discrete(&track, bf).vz().variance();
     let variances = [
-        ("(49)", Kind::Printed, vz::dv_discrete_variance_as_printed(&track, bf)),
-        ("(50)", Kind::Printed, variance),
-        ("(50)", Kind::Corrected, variance),
+        ("(49)", FormulaKind::Printed, vz::dv_discrete_variance_as_printed(&track, bf)),
+        ("(50)", FormulaKind::Printed, variance),
+        ("(50)", FormulaKind::Corrected, variance),
     ];
     let estimate = move |x: &[f64]| {
         let end = |i: usize| exact([0.0, 0.0, input(x, i)]);
@@ -302,10 +301,10 @@ fn dv_discrete(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
 }
 
 /// (21) with Z and Z′ from disparities of their own, as (49) has it.
-fn dv_discrete_independent(at: &Exact, noise: &Noise, bf: f64) -> Experiment {
+fn dv_discrete_independent(at: &ExactPixel, noise: &PixelNoise, bf: f64) -> Experiment {
     let printed = vz::dv_discrete_variance_as_printed(&at.stereo_track(noise), bf);
     let (d, moved) = (at.now.centre, at.moved);
     let estimate = move |x: &[f64]| -bf / (input(x, 0) * input(x, 1)) * (input(x, 3) - input(x, 2));
     let values = with([d, moved, d, moved], noise.disparity_px);
-    experiment("VZ", Inputs::Independent, values, estimate, &[("(49)", Kind::Printed, printed)])
+    experiment("VZ", Inputs::Independent, values, estimate, &[("(49)", FormulaKind::Printed, printed)])
 }

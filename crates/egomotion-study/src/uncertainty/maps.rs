@@ -1,25 +1,24 @@
 //! Figures 4 and 5: the synthetic world, and the variance of VZ over its image.
 
 use super::coefficients::Variances;
-use super::exact::{Exact, Noise};
-use crate::world::{When, World};
+use super::pixel::{ExactPixel, PixelNoise};
+use crate::synthetic::{EDGE_RAYS, FrameTime, SyntheticWorld};
 use crate::{Content, Figure, Panel};
 use egomotion::geometry::gaussian::rounding_variance;
-use egomotion::geometry::{Field, Grid};
+use egomotion::geometry::{Field, Grid, Twist};
+use egomotion::pipeline::Approach;
 use egomotion::sim::{Sequence, View, reference_pose};
 
-/// Rays in each direction through a pixel at an edge.
-const SAMPLES: usize = 3;
-/// Where Figure 5 is clipped, in mm².
-const CLIP_MM2: f32 = 3000.0;
+/// Largest variance that Figure 5 shows, in mm²: where the paper clips it.
+const LARGEST_SHOWN_MM2: f32 = 3000.0;
 
 /// Figure 4: left and right image and disparity at the sequence's first pose.
-pub fn figure_4(sequence: &Sequence) -> Figure {
-    let phi = sequence.phi_cyclopean(0).unwrap_or(egomotion::geometry::Twist::zero());
-    let images = View::new(&sequence.scene, &sequence.rig, reference_pose(&phi, 0)).render(SAMPLES);
-    let world = World::new(&sequence.scene, &sequence.rig, &phi, 0, 1.0);
+pub(super) fn figure_4(sequence: &Sequence) -> Figure {
+    let phi = sequence.phi_cyclopean(0).unwrap_or(Twist::zero());
+    let images = View::new(&sequence.scene, &sequence.rig, reference_pose(&phi, 0)).render(EDGE_RAYS);
+    let world = SyntheticWorld::new(&sequence.scene, &sequence.rig, &phi, 0, 1.0);
     let (width, height) = (sequence.rig.width_px, sequence.rig.height_px);
-    let disparity = world.disparity(When::Now);
+    let disparity = world.disparity(FrameTime::Now);
     let field = Field::from_grid(Grid::from_fn(width, height, |u, v| {
         disparity.get(v * width + u).map_or(f32::NAN, |&d| d as f32)
     }));
@@ -42,15 +41,15 @@ pub fn figure_4(sequence: &Sequence) -> Figure {
 }
 
 /// Figure 5: variance of VZ at every usable pixel with the rounding error of 1/4 px on disparity and flow.
-pub fn figure_5(sequence: &Sequence) -> Figure {
-    let phi = sequence.phi_cyclopean(0).unwrap_or(egomotion::geometry::Twist::zero());
-    let world = World::new(&sequence.scene, &sequence.rig, &phi, 0, 1.0);
+pub(super) fn figure_5(sequence: &Sequence) -> Figure {
+    let phi = sequence.phi_cyclopean(0).unwrap_or(Twist::zero());
+    let world = SyntheticWorld::new(&sequence.scene, &sequence.rig, &phi, 0, 1.0);
     let sigma = rounding_variance(0.25).sqrt();
-    let noise = Noise { disparity_px: sigma, flow_px: sigma };
+    let noise = PixelNoise { disparity_px: sigma, flow_px: sigma };
     let bf = world.rig.depth_disparity_product();
     let mut fields = [(); 6].map(|()| Grid::filled(world.rig.width_px, world.rig.height_px, f32::NAN));
-    for pixel in world.pixels().iter().filter(|pixel| pixel.differential) {
-        let Some(at) = Exact::at(&world, pixel.index) else { continue };
+    for pixel in world.usable_in(Approach::Differential) {
+        let Some(at) = ExactPixel::at(&world, pixel.index) else { continue };
         let Variances { printed, corrected } = Variances::of(&at, &noise, bf);
         let mm2 = [printed[0], corrected[0], corrected[1], corrected[2], corrected[3]].map(|v| 1e6 * v);
         let ratio = corrected[0] / corrected[1];
@@ -69,14 +68,14 @@ pub fn figure_5(sequence: &Sequence) -> Figure {
     let panel = |(title, field): (&str, Grid<f32>)| {
         let ratio = title.contains("against");
         let name = if ratio { "ratio of variances" } else { "variance of VZ (mm²)" };
-        let range = if ratio { (0.0, 4.0) } else { (0.0, CLIP_MM2) };
+        let range = if ratio { (0.0, 4.0) } else { (0.0, LARGEST_SHOWN_MM2) };
         let content = Content::Map { field: Field::from_grid(field), name: name.to_owned(), range };
         Panel { title: title.to_owned(), content }
     };
     Figure {
         id: "figure-05".to_owned(),
         title: "Figure 5. Variance of VZ over the image".to_owned(),
-        caption: "Sequence C, one step; variance (1/4)²/12 = .0052 px² on disparity and flow, clipped at \
+        caption: "Sequence C, one step; variance (1/4)²/12 = 0.0052 px² on disparity and flow, clipped at \
                   3000 mm² as in the paper, which shows (39) only. Pixels beside an edge and those that one \
                   camera does not see have no value. The farther a point, the larger its variance; the \
                   ratio DCCE/DV follows (1 + |v|²)/4, above 1 where the image moves faster than √3 px."

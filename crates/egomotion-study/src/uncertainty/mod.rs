@@ -1,40 +1,36 @@
-//! Section 5 of the paper: how uncertain VZ is, by its formulas and by drawing.
+//! Section 5: how uncertain VZ is, by the paper's formulas and by draws.
 //!
-//! [`exact`] measurements of a pixel → [`formula`]: estimators, inputs and predicted variances →
-//! [`monte_carlo`] → [`trial`]: cases at random places; beside them (51) in [`resolution`], (52) in
-//! [`rounding`], (53) in [`coefficients`], DCCE against DV in [`comparison`], and the [`maps`].
+//! A [`VarianceCase`] sets the variance that a formula predicts beside the variance over draws, at a place drawn at
+//! random. Beside the cases stand the table under (51), DCCE against DV ([`VarianceRatios`]) and the [`Coefficients`]
+//! of (53); figures 3 to 6 are the paper's.
 
-pub mod cases;
-pub mod coefficients;
-pub mod comparison;
-pub mod exact;
-pub mod formula;
-pub mod maps;
-pub mod monte_carlo;
-pub mod resolution;
-pub mod rounding;
-pub mod trial;
+mod case;
+mod coefficients;
+mod formula;
+mod maps;
+mod monte_carlo;
+mod pixel;
+mod ratios;
+mod resolution;
+mod rounding;
+mod sampling;
+mod variances;
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Publication, Study};
+pub use case::{SampledPlace, VarianceCase};
+pub use coefficients::{Coefficients, Swept};
+pub use formula::{Family, FormulaKind, Inputs};
+pub use ratios::{QuantileRange, VarianceRatios};
+
 use crate::range::{COUNTS, OutOfRange, size, within};
-use coefficients::Coefficients;
-use comparison::Comparison;
+use crate::sequences::PAPER_SEQUENCES;
+use crate::{Publication, Study};
 use egomotion::sim::Sequence;
-use formula::Family;
-use monte_carlo::mixed;
-use trial::Case;
+use monte_carlo::mixed_seed;
 
-/// The paper's sequences of its synthetic world.
-const SEQUENCES: [&str; 3] = ["A", "B", "C"];
-/// STEP of the sweeps: multiples of a sequence's motion.
-const STEPS: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
-/// ROUND of the sweeps: disparity levels per pixel.
-const LEVELS: [usize; 4] = [4, 8, 16, 32];
-
-/// `study uncertainty`: the table under (51), Figures 3 to 6, and each variance formula against draws.
+/// `study uncertainty`: section 5, the table under (51), Figures 3 to 6, and each variance formula against draws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Uncertainty {
@@ -68,35 +64,37 @@ pub enum UncertaintyError {
     Part(usize),
 }
 
-/// What a part finds.
+/// A finding of one part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum Finding {
+pub enum UncertaintyRecord {
     /// A formula against draws.
-    Case(Box<Case>),
+    Case(Box<VarianceCase>),
     /// DCCE against DV over an image.
-    Comparison(Comparison),
+    #[serde(rename = "Comparison")]
+    Ratios(VarianceRatios),
     /// The coefficients of (53) at one depth of the sphere and one speed.
     Coefficients(Coefficients),
 }
 
 /// One part of the study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
+enum UncertaintyPart {
     Formula(Family, &'static str),
-    Comparison(&'static str),
+    Ratios(&'static str),
     Coefficients,
 }
 
-impl Part {
+impl UncertaintyPart {
     fn all() -> Vec<Self> {
-        let formulas = Family::ALL.iter().flat_map(|&family| SEQUENCES.map(|s| Self::Formula(family, s)));
-        formulas.chain(SEQUENCES.map(Self::Comparison)).chain([Self::Coefficients]).collect()
+        let formulas =
+            Family::ALL.iter().flat_map(|&family| PAPER_SEQUENCES.map(|name| Self::Formula(family, name)));
+        formulas.chain(PAPER_SEQUENCES.map(Self::Ratios)).chain([Self::Coefficients]).collect()
     }
 
     fn name(self) -> String {
         match self {
             Self::Formula(family, sequence) => format!("{}, sequence {sequence}", family.name()),
-            Self::Comparison(sequence) => format!("DCCE against DV, sequence {sequence}"),
+            Self::Ratios(sequence) => format!("DCCE against DV, sequence {sequence}"),
             Self::Coefficients => "coefficients of (53)".to_owned(),
         }
     }
@@ -114,7 +112,7 @@ impl Uncertainty {
 }
 
 impl Study for Uncertainty {
-    type Record = Finding;
+    type Record = UncertaintyRecord;
     type Error = UncertaintyError;
 
     fn name(&self) -> &'static str {
@@ -128,56 +126,57 @@ impl Study for Uncertainty {
     }
 
     fn parts(&self) -> Vec<String> {
-        Part::all().into_iter().map(Part::name).collect()
+        UncertaintyPart::all().into_iter().map(UncertaintyPart::name).collect()
     }
 
-    fn run(&self, part: usize) -> Result<Vec<Finding>, UncertaintyError> {
+    fn run(&self, part: usize) -> Result<Vec<UncertaintyRecord>, UncertaintyError> {
         if self.draws < 2 {
             return Err(UncertaintyError::Draws(self.draws));
         }
-        let seed = mixed(&[self.seed, part as u64]);
-        Ok(match *Part::all().get(part).ok_or(UncertaintyError::Part(part))? {
-            Part::Formula(family, name) => {
-                let cases = trial::cases(family, &self.sequence(name)?, self.settings, self.draws, seed);
-                cases.into_iter().map(|case| Finding::Case(Box::new(case))).collect()
+        let seed = mixed_seed(&[self.seed, part as u64]);
+        Ok(match *UncertaintyPart::all().get(part).ok_or(UncertaintyError::Part(part))? {
+            UncertaintyPart::Formula(family, name) => {
+                let cases = sampling::cases(family, &self.sequence(name)?, self.settings, self.draws, seed);
+                cases.into_iter().map(|case| UncertaintyRecord::Case(Box::new(case))).collect()
             }
-            Part::Comparison(name) => {
-                comparison::over_steps(&self.sequence(name)?).into_iter().map(Finding::Comparison).collect()
+            UncertaintyPart::Ratios(name) => {
+                ratios::over_steps(&self.sequence(name)?).into_iter().map(UncertaintyRecord::Ratios).collect()
             }
-            Part::Coefficients => {
+            UncertaintyPart::Coefficients => {
                 let sequence = self.sequence("C")?;
                 let found = [coefficients::over_depth(&sequence), coefficients::over_speed(&sequence)];
-                found.into_iter().flatten().map(Finding::Coefficients).collect()
+                found.into_iter().flatten().map(UncertaintyRecord::Coefficients).collect()
             }
         })
     }
 
-    fn publish(&self, records: &[Finding]) -> Publication {
+    fn publish(&self, records: &[UncertaintyRecord]) -> Publication {
         let (mut drawn, mut compared, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         for record in records {
             match record {
-                Finding::Case(case) => drawn.push(&**case),
-                Finding::Comparison(comparison) => compared.push(comparison),
-                Finding::Coefficients(coefficients) => weights.push(coefficients),
+                UncertaintyRecord::Case(case) => drawn.push(&**case),
+                UncertaintyRecord::Ratios(ratios) => compared.push(ratios),
+                UncertaintyRecord::Coefficients(coefficients) => weights.push(coefficients),
             }
         }
-        let mut published = Publication {
+        let mut publication = Publication {
             title: "Uncertainty of depth velocity: section 5 of the paper".to_owned(),
-            data: vec![cases::data(&drawn), coefficients::data(&weights)],
+            data: vec![variances::data(&drawn), coefficients::data(&weights)],
             tables: vec![
                 resolution::table(),
-                cases::summary(&drawn),
-                cases::rounding(&drawn),
-                comparison::table(&compared),
+                variances::summary(&drawn),
+                variances::rounding(&drawn),
+                ratios::table(&compared),
                 coefficients::table(&weights),
             ],
             figures: vec![resolution::figure()],
         };
         if let Ok(sequence) = self.sequence("C") {
-            published.figures.extend([maps::figure_4(&sequence), maps::figure_5(&sequence)]);
+            publication.figures.extend([maps::figure_4(&sequence), maps::figure_5(&sequence)]);
         }
-        let drawings = [coefficients::figure(&weights), cases::figure(&drawn), cases::product_figure(&drawn)];
-        published.figures.extend(drawings);
-        published
+        let drawings =
+            [coefficients::figure(&weights), variances::figure(&drawn), variances::product_figure(&drawn)];
+        publication.figures.extend(drawings);
+        publication
     }
 }

@@ -1,15 +1,21 @@
-//! What a step of disparity can show of depth: the table under (51), and Figure 3.
+//! The resolution in depth of a step of disparity: the table under (51), and Figure 3.
 
 use crate::{Axis, Content, Figure, Line, Panel, Point, Series, Table};
 use egomotion::motion::depth_velocity::smallest_change;
 
 /// b f of section 5.5: 130 mm × 5 mm/0.012 mm, in millimetre pixels.
 const BF_MM: f64 = 130.0 * 5.0 / 0.012;
-/// Half of the baseline, in millimetres.
-const HALF_MM: f64 = 65.0;
+/// Half of the baseline of section 5.5, in millimetres.
+const HALF_BASELINE_MM: f64 = 65.0;
+/// Side of the pixels of Figure 3(a), in real pixels, whose cells could not be seen; larger cells are fewer.
+const COARSE_PX: f64 = 8.0;
+/// Depth at which the rays of Figure 3(a) begin, in millimetres.
+const NEAREST_MM: f64 = 900.0;
+/// Depth at which the rays of Figure 3(a) end, in millimetres.
+const FARTHEST_MM: f64 = 7000.0;
 
 /// The list under (51): (d in px, δ in px, Z in mm, ΔZ in mm) as the paper prints it.
-pub const PRINTED: [(f64, f64, f64, f64); 10] = [
+pub(super) const PRINTED: [(f64, f64, f64, f64); 10] = [
     (1.0, 0.0625, 54_167.0, -3186.0),
     (5.0, 0.0625, 10_833.0, -133.7),
     (10.0, 0.0625, 5417.0, -33.7),
@@ -23,7 +29,7 @@ pub const PRINTED: [(f64, f64, f64, f64); 10] = [
 ];
 
 /// The table under (51), ours beside the printed one.
-pub fn table() -> Table {
+pub(super) fn table() -> Table {
     let mut table = Table::new(
         "table-51",
         "Smallest change of depth that a step of disparity shows, (51)",
@@ -45,32 +51,29 @@ pub fn table() -> Table {
     table
 }
 
-/// Side of the pixels of Figure 3(a), in pixels: real ones could not be seen.
-const COARSE_PX: f64 = 8.0;
-/// Where the rays of Figure 3(a) begin and end, in millimetres.
-const NEAR_MM: f64 = 900.0;
-const FAR_MM: f64 = 7000.0;
-
 /// Figure 3.
-pub fn figure() -> Figure {
+pub(super) fn figure() -> Figure {
     let plan = Content::Plot {
         x: Axis::linear("X (mm)"),
         y: Axis::linear("Z (mm)"),
-        series: [("rays of the left camera", -HALF_MM), ("rays of the right camera", HALF_MM)]
-            .into_iter()
-            .flat_map(|(name, centre_mm)| (-3..=3).map(move |k| ray(name, centre_mm, k)))
-            .chain([5.0, 4.0, 3.0, 2.0].map(cell))
-            .collect(),
+        series: [
+            ("rays of the left camera", -HALF_BASELINE_MM),
+            ("rays of the right camera", HALF_BASELINE_MM),
+        ]
+        .into_iter()
+        .flat_map(|(name, centre_mm)| (-3..=3).map(move |k| ray(name, centre_mm, k)))
+        .chain([5.0, 4.0, 3.0, 2.0].map(cell))
+        .collect(),
     };
     let lines = [(1.0, "δ = 1 px"), (0.25, "δ = 1/4 px"), (0.0625, "δ = 1/16 px")].map(|(step, name)| {
         let depth = |i: i32| 1000.0 * 50.0_f64.powf(f64::from(i) / 16.0);
-        let point = |i: i32| point(depth(i), -smallest_change(BF_MM / depth(i), step, BF_MM));
+        let point = |i: i32| Point::at(depth(i), -smallest_change(BF_MM / depth(i), step, BF_MM));
         Series { name: name.to_owned(), line: Line::Solid, points: (0..=16).map(point).collect() }
     });
     let printed = Series {
         name: "printed under (51)".to_owned(),
         line: Line::Marks,
-        points: PRINTED.iter().map(|&(_, _, z, change)| point(z, -change)).collect(),
+        points: PRINTED.iter().map(|&(_, _, z, change)| Point::at(z, -change)).collect(),
     };
     let change = Content::Plot {
         x: Axis::log("Z (mm)"),
@@ -92,14 +95,10 @@ pub fn figure() -> Figure {
     }
 }
 
-fn point(x: f64, y: f64) -> Point {
-    Point { x, y, standard_error: None }
-}
-
 /// Ray of the camera at `centre_mm` through the `k`-th border of coarse pixels.
 fn ray(name: &str, centre_mm: f64, k: i32) -> Series {
     let slope = f64::from(k) * COARSE_PX * 0.012 / 5.0;
-    let points = [NEAR_MM, FAR_MM].map(|z| point(centre_mm + z * slope, z)).to_vec();
+    let points = [NEAREST_MM, FARTHEST_MM].map(|z| Point::at(centre_mm + z * slope, z)).to_vec();
     Series { name: name.to_owned(), line: Line::Reference, points }
 }
 
@@ -109,7 +108,7 @@ fn cell(disparity: f64) -> Series {
     let corner = |l: f64, r: f64| {
         // Where the rays of two borders meet: x = X/Z f + shift, so d = l − r.
         let d = COARSE_PX * (l - r);
-        point(-HALF_MM + 2.0 * HALF_MM * COARSE_PX * l / d, BF_MM / d)
+        Point::at(-HALF_BASELINE_MM + 2.0 * HALF_BASELINE_MM * COARSE_PX * l / d, BF_MM / d)
     };
     let right = left - disparity;
     let corners =
@@ -154,7 +153,11 @@ mod tests {
             assert!((length(s) / (2.0 * BF_MM / COARSE_PX / (d * d - 1.0)) - 1.0).abs() < 1e-12);
             for corner in &s.points {
                 let border = |centre: f64| (corner.x - centre) / corner.y * 5.0 / 0.012 / COARSE_PX;
-                assert!([-HALF_MM, HALF_MM].iter().all(|&c| (border(c) - border(c).round()).abs() < 1e-9));
+                assert!(
+                    [-HALF_BASELINE_MM, HALF_BASELINE_MM]
+                        .iter()
+                        .all(|&c| (border(c) - border(c).round()).abs() < 1e-9)
+                );
             }
         }
     }

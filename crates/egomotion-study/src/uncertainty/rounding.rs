@@ -10,7 +10,7 @@ use egomotion::geometry::gaussian::rounding_variance;
 /// the sawtooth error and its square are Fourier series, y − round(y) = −(q/π) Σ (−1)ᵏ/k sin(2πky/q),
 /// whose means over the noise have factors exp(−2(πkσ/q)²): (52) holds from about σ = q/2 on. Without
 /// noise the rounded value does not vary at all.
-pub fn rounded_variance(d: f64, sigma: f64, step: f64) -> f64 {
+pub(super) fn rounded_variance(d: f64, sigma: f64, step: f64) -> f64 {
     let ratio = sigma / step;
     if ratio <= 0.0 {
         return 0.0;
@@ -36,13 +36,13 @@ pub fn rounded_variance(d: f64, sigma: f64, step: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::uncertainty::monte_carlo::Noisy;
+    use crate::uncertainty::monte_carlo::NoisyFunction;
 
     #[test]
     fn against_draws() {
         for (d, sigma) in [(10.03, 0.07), (10.125, 0.07), (9.99, 0.2), (12.2, 0.05), (7.125, 0.01)] {
-            let drawn =
-                Noisy::new([(d, sigma)], |x: &[f64]| (4.0 * x[0] + 0.5).floor() / 4.0).drawn(100_000, 3);
+            let drawn = NoisyFunction::new([(d, sigma)], |x: &[f64]| (4.0 * x[0] + 0.5).floor() / 4.0)
+                .drawn(100_000, 3);
             let exact = rounded_variance(d, sigma, 0.25);
             assert!(
                 (drawn.variance - exact).abs() < 5.0 * drawn.standard_error,

@@ -1,7 +1,7 @@
 //! One axis of a plot: its range, its ticks, and the room that their labels take.
 
 use egomotion::metrics::quantile;
-use egomotion_study::figure::{Axis, Layout};
+use egomotion_study::{Axis, Layout};
 
 use crate::chart::number::significant;
 use crate::chart::plot::{Scale, extent};

@@ -1,7 +1,6 @@
 //! A panel of lines over two axes.
 
-use egomotion_study::figure::{Axis, Layout};
-use egomotion_study::{Line, Point, Series};
+use egomotion_study::{Axis, Layout, Line, Point, Series};
 use maud::{Markup, html};
 
 use super::axis::{Ranged, TICK_PX, width};

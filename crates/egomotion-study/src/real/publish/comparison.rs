@@ -1,13 +1,14 @@
 //! Least squares against least median of squares (6.2), and whether stated uncertainties are true.
 
-use super::Results;
-use super::tables::ways;
-use crate::real::way::{Estimator, Quantity, Way};
+use super::RealResults;
+use super::tables::contenders;
+use crate::real::contender::{ImageContender, ImageEstimator};
+use crate::real::quantity::Quantity;
+use crate::synthetic::APPROACHES;
 use crate::{Cell, Table};
-use egomotion::pipeline::Approach;
 
 /// Mean absolute error of LMedS over that of LS, and of maximum likelihood over the best of all others.
-pub(super) fn estimators(results: &Results<'_>) -> Table {
+pub(super) fn estimators(results: &RealResults<'_>) -> Table {
     let mut table = Table::new(
         "real-estimators",
         "Section 6.2: least median of squares against least squares",
@@ -15,14 +16,12 @@ pub(super) fn estimators(results: &Results<'_>) -> Table {
          better one. Last row: maximum likelihood over the best of all the others in each sequence.",
         &columns(&[("approach", "approach"), ("method", "method")]),
     );
-    let eam = |name: &str, way, quantity| results.get(name, Some(way), quantity).map(|found| found.eam);
-    let all: Vec<Way> = [Approach::Differential, Approach::Discrete]
-        .into_iter()
-        .flat_map(ways)
-        .filter(|w| *w != Way::BEST)
-        .collect();
-    for ls in all.iter().filter(|way| way.estimator == Estimator::Ls) {
-        let lmeds = Way { estimator: Estimator::Lmeds, ..*ls };
+    let eam =
+        |name: &str, contender, quantity| results.get(name, Some(contender), quantity).map(|found| found.eam);
+    let all: Vec<ImageContender> =
+        APPROACHES.into_iter().flat_map(contenders).filter(|w| *w != ImageContender::BEST).collect();
+    for ls in all.iter().filter(|contender| contender.estimator == ImageEstimator::Ls) {
+        let lmeds = ImageContender { estimator: ImageEstimator::Lmeds, ..*ls };
         let ratio = |quantity| {
             geometric_mean(
                 results
@@ -36,8 +35,8 @@ pub(super) fn estimators(results: &Results<'_>) -> Table {
     }
     let best = |quantity| {
         geometric_mean(results.sequences().into_iter().filter_map(|name| {
-            let others = all.iter().filter_map(|way| eam(name, *way, quantity));
-            Some(eam(name, Way::BEST, quantity)? / others.min_by(f64::total_cmp)?)
+            let others = all.iter().filter_map(|contender| eam(name, *contender, quantity));
+            Some(eam(name, ImageContender::BEST, quantity)? / others.min_by(f64::total_cmp)?)
         }))
     };
     table.rows.push(row(["discrete", "ml / best of the others"], Quantity::PHI.map(best)));
@@ -45,7 +44,7 @@ pub(super) fn estimators(results: &Results<'_>) -> Table {
 }
 
 /// Root mean square of error over stated standard deviation: 1 where the uncertainty is true.
-pub(super) fn consistency(results: &Results<'_>) -> Table {
+pub(super) fn consistency(results: &RealResults<'_>) -> Table {
     let mut table = Table::new(
         "real-consistency",
         "Whether the stated uncertainty of φ is true",
@@ -53,25 +52,26 @@ pub(super) fn consistency(results: &Results<'_>) -> Table {
          more where bias or wrong matches are not accounted for; the poses of a recording have errors of their own, which count too.",
         &columns(&[("approach", "approach"), ("method", "method"), ("estimator", "estimator")]),
     );
-    let mut all: Vec<Way> = [Approach::Differential, Approach::Discrete].into_iter().flat_map(ways).collect();
+    let mut all: Vec<ImageContender> = APPROACHES.into_iter().flat_map(contenders).collect();
     all.dedup();
-    all.sort_by_key(|way| usize::from(*way == Way::BEST));
+    all.sort_by_key(|contender| usize::from(*contender == ImageContender::BEST));
     all.dedup();
-    for way in all {
+    for contender in all {
         let normalised = |quantity: Quantity| {
-            let chosen = results.records.iter().filter(|r| r.way == Some(way) && r.quantity == quantity);
+            let chosen =
+                results.records.iter().filter(|r| r.contender == Some(contender) && r.quantity == quantity);
             let squares: Vec<f64> =
                 chosen.filter_map(|r| Some(((r.estimate - r.truth) / r.sigma?).powi(2))).collect();
             (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
         };
-        table.rows.push(row(way.names(), Quantity::PHI.map(normalised)));
+        table.rows.push(row(contender.names(), Quantity::PHI.map(normalised)));
     }
     table
 }
 
 fn columns(first: &[(&'static str, &'static str)]) -> Vec<(&'static str, &'static str)> {
     let component = |quantity: Quantity| {
-        let symbol = quantity.heading().split(' ').next().unwrap_or_default();
+        let symbol = quantity.symbol();
         (quantity.name(), symbol)
     };
     first.iter().copied().chain(Quantity::PHI.map(component)).collect()

@@ -1,13 +1,15 @@
 //! All records, and their summaries, as files.
 
-use super::Results;
-use crate::real::record::{Record, Summary};
-use crate::real::way::{Quantity, Way};
+use super::RealResults;
+use crate::real::contender::ImageContender;
+use crate::real::quantity::Quantity;
+use crate::real::record::RealRecord;
+use crate::real::statistics::PooledStatistics;
+use crate::sequences::two_frames;
 use crate::{Cell, Table};
-use egomotion::sim::Sequence;
 
-/// One row for each sequence, way and quantity, in the columns that all studies share.
-pub(super) fn aggregated(results: &Results<'_>) -> Table {
+/// One row for each sequence, contender and quantity, in the columns that all studies share.
+pub(super) fn aggregated(results: &RealResults<'_>) -> Table {
     let columns = [
         "sequence",
         "baseline",
@@ -34,19 +36,20 @@ pub(super) fn aggregated(results: &Results<'_>) -> Table {
          the scatter of the estimate are over draws; n counts draws; value is the sequence's speed in mm or degrees.",
         &columns.map(|name| (name, name)),
     );
-    let mut seen: Vec<(&str, Option<Way>, Quantity)> = Vec::new();
+    let mut seen: Vec<(&str, Option<ImageContender>, Quantity)> = Vec::new();
     for record in results.records {
-        let key = (record.sequence.as_str(), record.way, record.quantity);
+        let key = (record.sequence.as_str(), record.contender, record.quantity);
         if !seen.contains(&key) {
             seen.push(key);
         }
     }
-    for (sequence, way, quantity) in seen {
-        let chosen = |r: &Record| r.sequence == sequence && r.way == way && r.quantity == quantity;
-        let Some(found) = Summary::of(results.records, chosen) else { continue };
+    for (sequence, contender, quantity) in seen {
+        let chosen =
+            |r: &RealRecord| r.sequence == sequence && r.contender == contender && r.quantity == quantity;
+        let Some(found) = PooledStatistics::of(results.records, chosen) else { continue };
         let mut row: Vec<Cell> =
             vec![sequence.into(), "images".into(), "speed".into(), speed(sequence).into()];
-        row.extend(names(way).map(Cell::from));
+        row.extend(names(contender).map(Cell::from));
         row.push(quantity.name().into());
         row.extend(
             [found.erm_signed, found.erm_abs, Some(found.eam), found.std_percent.or(Some(found.std))]
@@ -60,7 +63,7 @@ pub(super) fn aggregated(results: &Results<'_>) -> Table {
 }
 
 /// One row for each record.
-pub(super) fn draws(records: &[Record]) -> Table {
+pub(super) fn draws(records: &[RealRecord]) -> Table {
     let columns = [
         "sequence",
         "pose",
@@ -92,7 +95,7 @@ pub(super) fn draws(records: &[Record]) -> Table {
             Cell::Number(record.pose as f64),
             record.seed.to_string().as_str().into(),
         ];
-        row.extend(names(record.way).map(Cell::from));
+        row.extend(names(record.contender).map(Cell::from));
         row.push(record.quantity.name().into());
         row.extend([record.estimate, record.truth, record.estimate - record.truth].map(Cell::from));
         row.extend([record.sigma, record.erm_signed, record.erm_abs].map(Cell::from));
@@ -102,13 +105,13 @@ pub(super) fn draws(records: &[Record]) -> Table {
     table
 }
 
-fn names(way: Option<Way>) -> [&'static str; 3] {
-    way.map_or(["", "matching", ""], |way| way.names())
+fn names(contender: Option<ImageContender>) -> [&'static str; 3] {
+    contender.map_or(["", "matching", ""], |contender| contender.names())
 }
 
 /// How fast a sequence is: |tZ| in mm per frame, or |ΩY| in degrees per frame where it only turns.
 pub(super) fn speed(sequence: &str) -> Option<f64> {
-    let phi = Sequence::named(sequence, None, Some(2), 1.0)?.phi_cyclopean(0)?;
+    let phi = two_frames(sequence)?.phi_cyclopean(0)?;
     let (forward, turn) = (1e3 * phi.t.z.abs(), phi.omega.y.to_degrees().abs());
     Some(if forward > 0.0 { forward } else { turn })
 }

@@ -1,23 +1,26 @@
 //! Figures 11 to 14, the paper's values as broken lines beside ours.
 
 use super::data::speed;
-use super::{Results, lab_name};
-use crate::real::lab::LabStudy;
+use super::{RealResults, lab_name};
+use crate::components::in_mm_deg;
+use crate::real::contender::{ImageContender, ImageEstimator};
+use crate::real::matching::MatchedFrames;
 use crate::real::printed::{TABLE_3, TABLE_6, TABLE_7, TABLES_4_5};
-use crate::real::record::in_mm_deg;
-use crate::real::way::{Estimator, Quantity, Way};
+use crate::real::quantity::Quantity;
+use crate::sequences::two_frames;
 use crate::{Axis, Content, Figure, Line, Panel, Point, Series};
 use egomotion::pipeline::{Approach, Method};
-use egomotion::sim::Sequence;
+use egomotion::sim::StereoImages;
 
-/// Translating along Z only, and turning only.
+/// Letters of the sequences that translate along Z alone, and of those that turn alone.
 const PATHS: [&[&str]; 2] = [&["E", "F", "G", "H", "I"], &["A", "B", "C", "D"]];
-/// The sequence whose images are shown.
-const SHOWN: &str = "lab-G";
 
 /// Figures 11 to 14.
-pub(super) fn all(study: &LabStudy, results: &Results<'_>) -> Vec<Figure> {
-    let mut figures: Vec<Figure> = images(study).into_iter().collect();
+pub(super) fn all(
+    example: Option<&([StereoImages; 3], MatchedFrames)>,
+    results: &RealResults<'_>,
+) -> Vec<Figure> {
+    let mut figures: Vec<Figure> = example.map(images).into_iter().collect();
     figures.push(Figure {
         id: "figure-12".to_owned(),
         title: "Figure 12. ERM of VZ against speed (broken: the paper's values)".to_owned(),
@@ -46,14 +49,13 @@ pub(super) fn all(study: &LabStudy, results: &Results<'_>) -> Vec<Figure> {
     figures
 }
 
-fn images(study: &LabStudy) -> Option<Figure> {
-    let (frames, measured) = study.example(SHOWN)?;
+fn images((frames, matched): &([StereoImages; 3], MatchedFrames)) -> Figure {
     let [_, now, _] = frames;
-    let disparity = measured.rounded[1].shift.clone();
+    let disparity = matched.rounded[1].shift.clone();
     let known = disparity.grid().values().iter().copied().filter(|d| d.is_finite());
     let range = known.fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), d| (lo.min(d), hi.max(d)));
     let panel = |title: &str, content| Panel { title: title.to_owned(), content };
-    Some(Figure {
+    Figure {
         id: "figure-11".to_owned(),
         title: "Figure 11. Intensity images and their disparity map".to_owned(),
         caption: "The room of the sequences lab-A to lab-M as the sensor gives it, and its computed disparity in steps of 1/16 px; \
@@ -61,19 +63,19 @@ fn images(study: &LabStudy) -> Option<Figure> {
             .to_owned(),
         columns: 3,
         panels: vec![
-            panel("left image", Content::Picture(now.left)),
-            panel("right image", Content::Picture(now.right)),
+            panel("left image", Content::Picture(now.left.clone())),
+            panel("right image", Content::Picture(now.right.clone())),
             panel(
                 "disparity",
                 Content::Map { field: disparity, name: "disparity (px)".to_owned(), range },
             ),
         ],
-    })
+    }
 }
 
 /// Name of a line: `DCCE/DIFF`.
-fn name(way: Way) -> &'static str {
-    match (way.method, way.approach) {
+fn name(contender: ImageContender) -> &'static str {
+    match (contender.method, contender.approach) {
         (Method::Dcce, Approach::Differential) => "DCCE/DIFF",
         (Method::Dv, Approach::Differential) => "DV/DIFF",
         (Method::Dcce, Approach::Discrete) => "DCCE/DISC",
@@ -101,18 +103,18 @@ fn series(
     Series { name, line, points: PATHS[path].iter().filter_map(point).collect() }
 }
 
-fn vz(results: &Results<'_>, path: usize) -> Panel {
-    let pixel = |approach, method| Way::new(approach, method, Estimator::Pixel);
+fn vz(results: &RealResults<'_>, path: usize) -> Panel {
+    let pixel = |approach, method| ImageContender::new(approach, method, ImageEstimator::Pixel);
     let (diff, disc) = (Approach::Differential, Approach::Discrete);
-    let ways = [
+    let contenders = [
         pixel(diff, Method::Dcce),
         pixel(diff, Method::Dv),
         pixel(disc, Method::Dcce),
         pixel(disc, Method::Dv),
     ];
-    let measured = |way: Way| {
-        series(name(way).to_owned(), Line::Solid, path, |letter| {
-            let found = results.lab(letter, Some(way), Quantity::Vz)?;
+    let ours = |contender: ImageContender| {
+        series(name(contender).to_owned(), Line::Solid, path, |letter| {
+            let found = results.lab(letter, Some(contender), Quantity::Vz)?;
             // The standard error of a signed mean that hovers about zero says little of its size.
             if path == 0 {
                 Some((found.erm_signed?.abs(), None))
@@ -121,67 +123,62 @@ fn vz(results: &Results<'_>, path: usize) -> Panel {
             }
         })
     };
-    let printed = |way: Way| {
-        let table = if way.approach == diff { &TABLE_3 } else { &TABLE_6 };
-        let which = usize::from(way.method == Method::Dv);
-        series(name(way).to_owned(), Line::Dashed, path, |letter| {
+    let papers = |contender: ImageContender| {
+        let table = if contender.approach == diff { &TABLE_3 } else { &TABLE_6 };
+        let which = usize::from(contender.method == Method::Dv);
+        series(name(contender).to_owned(), Line::Dashed, path, |letter| {
             let row = table.iter().find(|row| row.letter == letter)?;
             Some((row.erm_percent[which].abs(), None))
         })
     };
-    let lines = ways.iter().copied().chain([Way::BEST]).map(measured);
+    let lines = contenders.iter().copied().chain([ImageContender::BEST]).map(ours);
     Panel {
         title: ["(a) translating, E to I", "(b) turning, A to D"][path].to_owned(),
         content: Content::Plot {
             x: axis(path),
             y: Axis::log("ERM (%)"),
-            series: lines.chain(ways.iter().copied().map(printed)).collect(),
+            series: lines.chain(contenders.iter().copied().map(papers)).collect(),
         },
     }
 }
 
-fn phi(results: &Results<'_>, path: usize, i: usize, quantity: Quantity) -> Panel {
-    let ls = |approach, method| Way::new(approach, method, Estimator::Ls);
-    let ways = [
+fn phi(results: &RealResults<'_>, path: usize, i: usize, quantity: Quantity) -> Panel {
+    let ls = |approach, method| ImageContender::new(approach, method, ImageEstimator::Ls);
+    let contenders = [
         ls(Approach::Differential, Method::Dcce),
         ls(Approach::Differential, Method::Dv),
         ls(Approach::Discrete, Method::Linear22),
     ];
     let relative = (path == 0 && quantity == Quantity::Tz) || (path == 1 && quantity == Quantity::Wy);
-    let measured = |way: Way| {
-        series(name(way).to_owned(), Line::Solid, path, |letter| {
-            let found = results.lab(letter, Some(way), quantity)?;
+    let ours = |contender: ImageContender| {
+        series(name(contender).to_owned(), Line::Solid, path, |letter| {
+            let found = results.lab(letter, Some(contender), quantity)?;
             let y = if relative { found.erm_abs? } else { found.eam };
             Some((y, found.standard_error))
         })
     };
-    let printed = |way: Way| {
-        series(name(way).to_owned(), Line::Dashed, path, |letter| {
-            let value = match way.method {
+    let papers = |contender: ImageContender| {
+        series(name(contender).to_owned(), Line::Dashed, path, |letter| {
+            let value = match contender.method {
                 Method::Dcce => TABLES_4_5.iter().find(|row| row.letter == letter)?.dcce[i],
                 Method::Dv => TABLES_4_5.iter().find(|row| row.letter == letter)?.dv[i],
                 _ => TABLE_7.iter().find(|row| row.0 == letter)?.1[i],
             };
-            let truth =
-                in_mm_deg(&Sequence::named(&lab_name(letter), None, Some(2), 1.0)?.phi_cyclopean(0)?)[i];
+            let truth = in_mm_deg(&two_frames(&lab_name(letter))?.phi_cyclopean(0)?)[i];
             let error = (value - truth).abs();
             Some((if relative { 100.0 * error / truth.abs() } else { error }, None))
         })
     };
-    let lines = ways.iter().copied().chain([Way::BEST]).map(measured);
+    let lines = contenders.iter().copied().chain([ImageContender::BEST]).map(ours);
     let symbol = quantity.heading();
     let letter = ["a", "b", "c", "d", "e", "f"][i];
-    let y = if relative {
-        format!("ERM of {} (%)", symbol.split(' ').next().unwrap_or_default())
-    } else {
-        format!("EAM of {symbol}")
-    };
+    let y = if relative { format!("ERM of {} (%)", quantity.symbol()) } else { format!("EAM of {symbol}") };
     Panel {
-        title: format!("({letter}) {}", symbol.split(' ').next().unwrap_or_default()),
+        title: format!("({letter}) {}", quantity.symbol()),
         content: Content::Plot {
             x: axis(path),
             y: Axis::log(y),
-            series: lines.chain(ways.iter().copied().map(printed)).collect(),
+            series: lines.chain(contenders.iter().copied().map(papers)).collect(),
         },
     }
 }

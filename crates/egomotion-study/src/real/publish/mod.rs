@@ -6,15 +6,20 @@ mod figures;
 mod recording;
 mod tables;
 
-use super::lab::LabStudy;
-use super::record::{Record, Summary};
-use super::way::{Quantity, Way};
+use super::contender::ImageContender;
+use super::matching::MatchedFrames;
+use super::quantity::Quantity;
+use super::record::RealRecord;
+use super::statistics::PooledStatistics;
 use crate::Publication;
-use egomotion::sim::Sequence;
+use egomotion::sim::{Sequence, StereoImages};
 
-/// All that the records of the lab say.
-pub(super) fn lab(study: &LabStudy, records: &[Record]) -> Publication {
-    let results = Results { records };
+/// Tables and figures of the rendered sequences; `example` is what Figure 11 shows.
+pub(super) fn lab(
+    example: Option<&([StereoImages; 3], MatchedFrames)>,
+    records: &[RealRecord],
+) -> Publication {
+    let results = RealResults { records };
     let mut tables = vec![tables::matching(&results)];
     tables.extend(tables::printed(&results));
     tables.push(comparison::estimators(&results));
@@ -23,13 +28,13 @@ pub(super) fn lab(study: &LabStudy, records: &[Record]) -> Publication {
         title: "Section 7.2: the manipulator's sequences through the whole image pipeline".to_owned(),
         data: vec![data::aggregated(&results), data::draws(records)],
         tables,
-        figures: figures::all(study, &results),
+        figures: figures::all(example, &results),
     }
 }
 
-/// All that the records of a recording say; `name` is that of its sequence.
-pub(super) fn recording(name: &str, records: &[Record]) -> Publication {
-    let results = Results { records };
+/// Tables and figures of a recording; `name` is that of its sequence.
+pub(super) fn recording(name: &str, records: &[RealRecord]) -> Publication {
+    let results = RealResults { records };
     let mut tables = recording::tables(name, &results);
     tables.push(comparison::estimators(&results));
     tables.push(comparison::consistency(&results));
@@ -41,22 +46,32 @@ pub(super) fn recording(name: &str, records: &[Record]) -> Publication {
     }
 }
 
-/// What the records say.
-struct Results<'a> {
-    records: &'a [Record],
+/// The records, and statistics over them.
+struct RealResults<'a> {
+    records: &'a [RealRecord],
 }
 
-impl Results<'_> {
+impl RealResults<'_> {
     /// Over the draws of one sequence.
-    fn get(&self, sequence: &str, way: Option<Way>, quantity: Quantity) -> Option<Summary> {
-        Summary::of(self.records, |record| {
-            record.way == way && record.quantity == quantity && record.sequence == sequence
+    fn get(
+        &self,
+        sequence: &str,
+        contender: Option<ImageContender>,
+        quantity: Quantity,
+    ) -> Option<PooledStatistics> {
+        PooledStatistics::of(self.records, |record| {
+            record.contender == contender && record.quantity == quantity && record.sequence == sequence
         })
     }
 
     /// Over the draws of the lab sequence of that letter.
-    fn lab(&self, letter: &str, way: Option<Way>, quantity: Quantity) -> Option<Summary> {
-        self.get(&lab_name(letter), way, quantity)
+    fn lab(
+        &self,
+        letter: &str,
+        contender: Option<ImageContender>,
+        quantity: Quantity,
+    ) -> Option<PooledStatistics> {
+        self.get(&lab_name(letter), contender, quantity)
     }
 
     /// Names of the sequences, in the order of their records.

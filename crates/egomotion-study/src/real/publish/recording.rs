@@ -1,26 +1,25 @@
 //! Tables 3 to 7 for a recording, and its errors from frame to frame.
 
-use super::Results;
-use super::tables::{measured, ways};
-use crate::real::record::Summary;
-use crate::real::way::{Estimator, Quantity, Way};
-use crate::{Axis, Cell, Content, Figure, Line, Panel, Point, Series, Table};
+use super::RealResults;
+use super::tables::{contenders, mean_and_scatter};
+use crate::real::contender::{ImageContender, ImageEstimator};
+use crate::real::quantity::Quantity;
+use crate::real::statistics::PooledStatistics;
+use crate::synthetic::{APPROACHES, approach_name};
+use crate::{Axis, Cell, Content, Figure, Line, Panel, Series, Table};
 use egomotion::pipeline::{Approach, Method};
 
-const APPROACHES: [(Approach, &str); 2] =
-    [(Approach::Differential, "differential"), (Approach::Discrete, "discrete")];
-
 /// VZ as in Tables 3 and 6, then φ and its errors as in Tables 4, 5 and 7.
-pub(super) fn tables(name: &str, results: &Results<'_>) -> Vec<Table> {
+pub(super) fn tables(name: &str, results: &RealResults<'_>) -> Vec<Table> {
     let mut tables = vec![vz(name, results)];
-    for (approach, word) in APPROACHES {
-        tables.push(phi(name, results, approach, word));
-        tables.push(errors(name, results, approach, word));
+    for approach in APPROACHES {
+        tables.push(phi(name, results, approach));
+        tables.push(errors(name, results, approach));
     }
     tables
 }
 
-fn vz(name: &str, results: &Results<'_>) -> Table {
+fn vz(name: &str, results: &RealResults<'_>) -> Table {
     let mut table = Table::new(
         "recording-vz",
         "VZ, in the form of Tables 3 and 6",
@@ -37,16 +36,16 @@ fn vz(name: &str, results: &Results<'_>) -> Table {
             ("n", "frames"),
         ],
     );
-    let pixel = |approach, method| Way::new(approach, method, Estimator::Pixel);
-    for way in [
+    let pixel = |approach, method| ImageContender::new(approach, method, ImageEstimator::Pixel);
+    for contender in [
         pixel(Approach::Differential, Method::Dcce),
         pixel(Approach::Differential, Method::Dv),
         pixel(Approach::Discrete, Method::Dcce),
         pixel(Approach::Discrete, Method::Dv),
-        Way::BEST,
+        ImageContender::BEST,
     ] {
-        let Some(found) = results.get(name, Some(way), Quantity::VzStill) else { continue };
-        let [approach, method, _] = way.names();
+        let Some(found) = results.get(name, Some(contender), Quantity::VzStill) else { continue };
+        let [approach, method, _] = contender.names();
         let mut cells: Vec<Cell> =
             vec![approach.into(), method.into(), found.estimate.into(), found.truth.into()];
         cells.extend([found.erm_signed, found.erm_abs, found.std_percent].map(Cell::from));
@@ -61,7 +60,8 @@ fn columns() -> Vec<(&'static str, &'static str)> {
     [("row", "")].into_iter().chain(phi).chain([("n", "frames")]).collect()
 }
 
-fn phi(name: &str, results: &Results<'_>, approach: Approach, word: &str) -> Table {
+fn phi(name: &str, results: &RealResults<'_>, approach: Approach) -> Table {
+    let word = approach_name(approach);
     let mut table = Table::new(
         &format!("recording-phi-{word}"),
         &format!("φ, {word} approach, in the form of Tables 4, 5 and 7"),
@@ -69,26 +69,31 @@ fn phi(name: &str, results: &Results<'_>, approach: Approach, word: &str) -> Tab
          the motion itself.",
         &columns(),
     );
-    let ways = ways(approach);
+    let contenders = contenders(approach);
     let mut exact: Vec<Cell> = vec!["exact".into()];
     let truth = |quantity| {
-        let way = ways.first().copied();
-        results.get(name, way, quantity).map(|found| Summary { estimate: found.truth, scatter: 0.0, ..found })
+        let contender = contenders.first().copied();
+        results.get(name, contender, quantity).map(|found| PooledStatistics {
+            estimate: found.truth,
+            scatter: 0.0,
+            ..found
+        })
     };
     exact.extend(Quantity::PHI.map(|quantity| Cell::from(truth(quantity).map(|found| found.estimate))));
     exact.push(Cell::Empty);
     table.rows.push(exact);
-    for way in ways {
-        let found = |quantity| results.get(name, Some(way), quantity);
-        let mut cells: Vec<Cell> = vec![way.label().into()];
-        cells.extend(Quantity::PHI.map(|quantity| measured(found(quantity), quantity)));
+    for contender in contenders {
+        let found = |quantity| results.get(name, Some(contender), quantity);
+        let mut cells: Vec<Cell> = vec![contender.label().into()];
+        cells.extend(Quantity::PHI.map(|quantity| mean_and_scatter(found(quantity), quantity)));
         cells.push(found(Quantity::Tz).map(|found| found.n).into());
         table.rows.push(cells);
     }
     table
 }
 
-fn errors(name: &str, results: &Results<'_>, approach: Approach, word: &str) -> Table {
+fn errors(name: &str, results: &RealResults<'_>, approach: Approach) -> Table {
+    let word = approach_name(approach);
     let mut table = Table::new(
         &format!("recording-errors-{word}"),
         &format!("Errors of φ from frame to frame, {word} approach"),
@@ -96,9 +101,9 @@ fn errors(name: &str, results: &Results<'_>, approach: Approach, word: &str) -> 
          have errors of their own.",
         &columns(),
     );
-    for way in ways(approach) {
-        let found = Quantity::PHI.map(|quantity| results.get(name, Some(way), quantity));
-        let mut cells: Vec<Cell> = vec![way.label().into()];
+    for contender in contenders(approach) {
+        let found = Quantity::PHI.map(|quantity| results.get(name, Some(contender), quantity));
+        let mut cells: Vec<Cell> = vec![contender.label().into()];
         cells.extend(found.each_ref().map(|found| Cell::from(found.as_ref().map(|found| found.eam))));
         cells.push(found[2].as_ref().map(|found| found.n).into());
         table.rows.push(cells);
@@ -107,7 +112,7 @@ fn errors(name: &str, results: &Results<'_>, approach: Approach, word: &str) -> 
 }
 
 /// Errors of tZ and ΩY from frame to frame.
-pub(super) fn figures(results: &Results<'_>) -> Vec<Figure> {
+pub(super) fn figures(results: &RealResults<'_>) -> Vec<Figure> {
     let panel = |(i, quantity): (usize, Quantity)| Panel {
         title: format!("({}) {}", ["a", "b"][i], quantity.heading()),
         content: Content::Plot {
@@ -127,18 +132,18 @@ pub(super) fn figures(results: &Results<'_>) -> Vec<Figure> {
     }]
 }
 
-fn lines(results: &Results<'_>, quantity: Quantity) -> Vec<Series> {
-    let line = |(approach, method, estimator, name): (Approach, Method, Estimator, &str)| {
-        let way = Way::new(approach, method, estimator);
-        let chosen = results.records.iter().filter(|r| r.way == Some(way) && r.quantity == quantity);
-        let points = chosen.map(|r| Point { x: r.pose as f64, y: r.eam, standard_error: None });
-        Series { name: name.to_owned(), line: Line::Solid, points: points.collect() }
+fn lines(results: &RealResults<'_>, quantity: Quantity) -> Vec<Series> {
+    let line = |(approach, method, estimator, name): (Approach, Method, ImageEstimator, &str)| {
+        let contender = ImageContender::new(approach, method, estimator);
+        let chosen =
+            results.records.iter().filter(|r| r.contender == Some(contender) && r.quantity == quantity);
+        Series::through(name, Line::Solid, chosen.map(|r| (r.pose as f64, r.eam)))
     };
     [
-        (Approach::Differential, Method::Dcce, Estimator::Ls, "DCCE/DIFF"),
-        (Approach::Differential, Method::Dv, Estimator::Ls, "DV/DIFF"),
-        (Approach::Discrete, Method::Rigid, Estimator::Ls, "(22) with a rotation"),
-        (Approach::Discrete, Method::Ml, Estimator::Ml, "maximum likelihood"),
+        (Approach::Differential, Method::Dcce, ImageEstimator::Ls, "DCCE/DIFF"),
+        (Approach::Differential, Method::Dv, ImageEstimator::Ls, "DV/DIFF"),
+        (Approach::Discrete, Method::Rigid, ImageEstimator::Ls, "(22) with a rotation"),
+        (Approach::Discrete, Method::Ml, ImageEstimator::Ml, "maximum likelihood"),
     ]
     .map(line)
     .to_vec()

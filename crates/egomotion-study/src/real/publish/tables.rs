@@ -1,15 +1,17 @@
 //! Tables 3 to 7 in the paper's form, its own values beside ours.
 
-use super::{Results, lab_name};
-use crate::real::printed::{MmDeg, PrintedVz, TABLE_3, TABLE_6, TABLE_7, TABLES_4_5};
-use crate::real::record::{Summary, in_mm_deg};
-use crate::real::way::{Estimator, Quantity, Way};
+use super::{RealResults, lab_name};
+use crate::components::in_mm_deg;
+use crate::real::contender::{ImageContender, ImageEstimator};
+use crate::real::printed::{MmDeg, PrintedDepthVelocity, TABLE_3, TABLE_6, TABLE_7, TABLES_4_5};
+use crate::real::quantity::Quantity;
+use crate::real::statistics::PooledStatistics;
+use crate::sequences::two_frames;
 use crate::{Cell, Table};
 use egomotion::pipeline::{Approach, Method};
-use egomotion::sim::Sequence;
 
 /// How well the images were matched.
-pub(super) fn matching(results: &Results<'_>) -> Table {
+pub(super) fn matching(results: &RealResults<'_>) -> Table {
     let mut table = Table::new(
         "real-matching",
         "What the methods had to work with",
@@ -28,7 +30,7 @@ pub(super) fn matching(results: &Results<'_>) -> Table {
 }
 
 /// Tables 3 to 7.
-pub(super) fn printed(results: &Results<'_>) -> Vec<Table> {
+pub(super) fn printed(results: &RealResults<'_>) -> Vec<Table> {
     let turning = |letter: &str| ["A", "B", "C", "D"].contains(&letter);
     vec![
         vz(
@@ -65,7 +67,12 @@ pub(super) fn printed(results: &Results<'_>) -> Vec<Table> {
 }
 
 /// Table 3 or 6: three rows for each sequence.
-fn vz(results: &Results<'_>, (id, title): (&str, &str), approach: Approach, printed: &[PrintedVz]) -> Table {
+fn vz(
+    results: &RealResults<'_>,
+    (id, title): (&str, &str),
+    approach: Approach,
+    printed: &[PrintedDepthVelocity],
+) -> Table {
     let mut table = Table::new(
         id,
         title,
@@ -88,10 +95,10 @@ fn vz(results: &Results<'_>, (id, title): (&str, &str), approach: Approach, prin
             ("std_ml", "ML"),
         ],
     );
-    let ways = [
-        Way::new(approach, Method::Dcce, Estimator::Pixel),
-        Way::new(approach, Method::Dv, Estimator::Pixel),
-        Way::BEST,
+    let contenders = [
+        ImageContender::new(approach, Method::Dcce, ImageEstimator::Pixel),
+        ImageContender::new(approach, Method::Dv, ImageEstimator::Pixel),
+        ImageContender::BEST,
     ];
     let letters = results.letters();
     for row in printed.iter().filter(|row| letters.contains(&row.letter)) {
@@ -103,8 +110,8 @@ fn vz(results: &Results<'_>, (id, title): (&str, &str), approach: Approach, prin
         cells.extend(pair(row.erm_percent).into_iter().chain(pair(row.std_percent)));
         table.rows.push(cells);
         for (source, quantity) in [("here", Quantity::Vz), ("here, anywhere", Quantity::VzAnywhere)] {
-            let found = ways.map(|way| results.lab(row.letter, Some(way), quantity));
-            let each = |value: fn(&Summary) -> Option<f64>| {
+            let found = contenders.map(|contender| results.lab(row.letter, Some(contender), quantity));
+            let each = |value: fn(&PooledStatistics) -> Option<f64>| {
                 found.each_ref().map(|found| Cell::from(found.as_ref().and_then(value)))
             };
             let mut cells: Vec<Cell> = vec![row.letter.into(), source.into()];
@@ -125,7 +132,7 @@ fn vz(results: &Results<'_>, (id, title): (&str, &str), approach: Approach, prin
 
 /// Table 4, 5 or 7: the truth, the paper's estimates, ours.
 fn phi(
-    results: &Results<'_>,
+    results: &RealResults<'_>,
     (id, title): (&str, &str),
     approach: Approach,
     chosen: impl Fn(&str) -> bool,
@@ -146,10 +153,12 @@ fn phi(
             cells.extend(values.map(Cell::from));
             table.rows.push(cells);
         }
-        for way in ways(approach) {
-            let mut cells: Vec<Cell> = vec![letter.into(), way.label().into()];
+        for contender in contenders(approach) {
+            let mut cells: Vec<Cell> = vec![letter.into(), contender.label().into()];
             cells.extend(
-                Quantity::PHI.map(|quantity| measured(results.lab(letter, Some(way), quantity), quantity)),
+                Quantity::PHI.map(|quantity| {
+                    mean_and_scatter(results.lab(letter, Some(contender), quantity), quantity)
+                }),
             );
             table.rows.push(cells);
         }
@@ -157,10 +166,10 @@ fn phi(
     table
 }
 
-/// The truth and what the paper prints for one sequence.
+/// The truth and the paper's values of one sequence.
 fn printed_rows(letter: &str, approach: Approach) -> Vec<(&'static str, MmDeg)> {
     let mut rows = Vec::new();
-    let sequence = Sequence::named(&lab_name(letter), None, Some(2), 1.0);
+    let sequence = two_frames(&lab_name(letter));
     rows.extend(sequence.and_then(|s| s.phi_cyclopean(0)).map(|phi| ("exact", in_mm_deg(&phi))));
     if approach == Approach::Differential {
         for row in TABLES_4_5.iter().filter(|row| row.letter == letter) {
@@ -172,18 +181,20 @@ fn printed_rows(letter: &str, approach: Approach) -> Vec<(&'static str, MmDeg)> 
     rows
 }
 
-/// The ways of an approach, in the order of the rows; the best one last.
-pub(super) fn ways(approach: Approach) -> Vec<Way> {
+/// The contenders of an approach, in the order of the rows; the best one last.
+pub(super) fn contenders(approach: Approach) -> Vec<ImageContender> {
     let methods: &[Method] = match approach {
         Approach::Differential => &[Method::Dcce, Method::Dv],
         Approach::Discrete => &[Method::Linear22, Method::Rigid, Method::Dcce, Method::Dv],
     };
-    let both = |&method: &Method| [Estimator::Ls, Estimator::Lmeds].map(|e| Way::new(approach, method, e));
-    methods.iter().flat_map(both).chain([Way::BEST]).collect()
+    let both = |&method: &Method| {
+        [ImageEstimator::Ls, ImageEstimator::Lmeds].map(|e| ImageContender::new(approach, method, e))
+    };
+    methods.iter().flat_map(both).chain([ImageContender::BEST]).collect()
 }
 
 /// Mean ± scatter, with as many digits as the paper prints.
-pub(super) fn measured(found: Option<Summary>, quantity: Quantity) -> Cell {
+pub(super) fn mean_and_scatter(found: Option<PooledStatistics>, quantity: Quantity) -> Cell {
     let Some(found) = found else { return Cell::Empty };
     let digits = if matches!(quantity, Quantity::Tx | Quantity::Ty | Quantity::Tz) { 2 } else { 3 };
     // One digit more where the scatter would vanish.

@@ -4,11 +4,12 @@ use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
 use egomotion::geometry::{RigidMotion, StereoRig, Twist};
+use egomotion::pipeline::Approach;
 use egomotion::sim::{Scene, View, reference_pose};
 
-/// One moment of the world: exact disparity and surface of every pixel of the left image.
+/// Exact disparity and surface of every pixel of the left image at one time.
 #[derive(Debug, Clone, PartialEq)]
-struct Moment {
+struct ExactMaps {
     disparity: Vec<f64>,
     surface: Vec<Option<u16>>,
 }
@@ -38,24 +39,42 @@ pub struct UsablePixel {
     pub discrete: bool,
 }
 
+impl UsablePixel {
+    /// Whether the form of an approach may use it.
+    pub(crate) fn usable_in(&self, approach: Approach) -> bool {
+        match approach {
+            Approach::Differential => self.differential,
+            Approach::Discrete => self.discrete,
+        }
+    }
+
+    /// The depth velocity that an approach speaks of, in metres per interval: VZ, or Z′ − Z.
+    pub(crate) fn depth_velocity_m(&self, approach: Approach) -> f64 {
+        match approach {
+            Approach::Differential => self.vz_m,
+            Approach::Discrete => self.depth_change_m,
+        }
+    }
+}
+
 /// The world around one reference pose, for one motion of a frame pair.
 ///
 /// A pixel may be used if both cameras see it and every disparity that its gradient and its rate are made of
 /// lies on one surface: in the differential form its four neighbours and itself at t, and itself at t − 1 and
 /// t + 1; in the discrete form its four neighbours and itself both at t and at t′.
 #[derive(Debug, Clone, PartialEq)]
-pub struct World {
+pub struct SyntheticWorld {
     /// The cameras.
     pub rig: StereoRig,
     /// The pair's motion: scene motion of the left camera.
     pub phi: Twist,
-    moments: [Moment; 3],
+    maps: [ExactMaps; 3],
     pixels: Vec<UsablePixel>,
 }
 
-/// t − 1, t and t + 1 in [`World::disparity`].
+/// Which of the three frames around t.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum When {
+pub(crate) enum FrameTime {
     /// One interval before.
     Before,
     /// At t.
@@ -64,35 +83,40 @@ pub enum When {
     After,
 }
 
-impl World {
+impl SyntheticWorld {
     /// A scene seen from the reference pose exp(k φ), moving by `step` φ; φ is of the cyclopean camera.
     pub fn new(scene: &Scene, rig: &StereoRig, phi: &Twist, k: i32, step: f64) -> Self {
         let pose = reference_pose(phi, k);
         let moved = phi.scaled(step);
         let at = |motion: RigidMotion| View::new(scene, rig, pose.after(&motion));
         let views = [at(moved.exp()), at(RigidMotion::identity()), at(moved.exp().inverse())];
-        let moments = views.map(|view| moment(&view));
+        let maps = views.map(|view| exact_maps(&view));
         let phi = moved.seen_from(&rig.left_from_cyclopean());
         let pixels = (0..rig.width_px * rig.height_px)
             .into_par_iter()
             .with_min_len(rig.width_px)
-            .filter_map(|index| usable(&views[1], &moments, &phi, index))
+            .filter_map(|index| usable(&views[1], &maps, &phi, index))
             .collect();
-        Self { rig: *rig, phi, moments, pixels }
+        Self { rig: *rig, phi, maps, pixels }
+    }
+
+    /// Pixels that the form of an approach may use, in row-major order.
+    pub(crate) fn usable_in(&self, approach: Approach) -> impl Iterator<Item = &UsablePixel> {
+        self.pixels.iter().filter(move |pixel| pixel.usable_in(approach))
     }
 
     /// Pixels that one of the two forms may use, in row-major order.
-    pub fn pixels(&self) -> &[UsablePixel] {
+    pub(crate) fn pixels(&self) -> &[UsablePixel] {
         &self.pixels
     }
 
     /// Exact disparity at every pixel, row-major, in pixels; NaN where nothing is seen.
-    pub fn disparity(&self, when: When) -> &[f64] {
-        &self.moments[when as usize].disparity
+    pub(crate) fn disparity(&self, when: FrameTime) -> &[f64] {
+        &self.maps[when as usize].disparity
     }
 }
 
-fn moment(view: &View<'_>) -> Moment {
+fn exact_maps(view: &View<'_>) -> ExactMaps {
     let (width, height) = (view.rig.width_px, view.rig.height_px);
     let (disparity, surface) = (0..width * height)
         .into_par_iter()
@@ -102,7 +126,7 @@ fn moment(view: &View<'_>) -> Moment {
             seen.map_or((f64::NAN, None), |(xyd, surface)| (xyd.z, Some(surface)))
         })
         .unzip();
-    Moment { disparity, surface }
+    ExactMaps { disparity, surface }
 }
 
 /// The surface under the five-pixel stencil; `None` at the border or across an edge.
@@ -115,11 +139,11 @@ fn stencil(surface: &[Option<u16>], index: usize, width: usize, height: usize) -
     surface[index].filter(|_| neighbours.iter().all(|&i| surface[i] == surface[index]))
 }
 
-fn usable(view: &View<'_>, moments: &[Moment; 3], phi: &Twist, index: usize) -> Option<UsablePixel> {
+fn usable(view: &View<'_>, maps: &[ExactMaps; 3], phi: &Twist, index: usize) -> Option<UsablePixel> {
     let (width, height) = (view.rig.width_px, view.rig.height_px);
-    let [before, now, after] = moments;
+    let [before, now, after] = maps;
     let surface = stencil(&now.surface, index, width, height)?;
-    let stays = |moment: &Moment| moment.surface[index] == Some(surface);
+    let stays = |maps: &ExactMaps| maps.surface[index] == Some(surface);
     let differential = stays(before) && stays(after);
     let discrete = stencil(&after.surface, index, width, height) == Some(surface);
     if !(differential || discrete) {

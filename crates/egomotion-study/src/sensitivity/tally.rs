@@ -1,17 +1,17 @@
-//! ERM, EAM and STD gathered over draws, as sums that add up whatever the number of parts.
+//! ERM, EAM and STD gathered over draws, as sums that give the same whatever the number of parts.
 
 use serde::{Deserialize, Serialize};
 
 use egomotion::metrics::SectionSeven;
 
-/// Sum and sum of squares.
+/// Sum and sum of squares of a value over draws.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-struct Sums {
+struct Moments {
     sum: f64,
     squares: f64,
 }
 
-impl Sums {
+impl Moments {
     fn of(value: f64) -> Self {
         Self { sum: value, squares: value * value }
     }
@@ -30,22 +30,22 @@ impl Sums {
 
 /// Errors of one quantity over draws.
 ///
-/// Relative figures are in percent of the truth; where the truth is zero there are none, and everything is in
-/// the quantity's own unit (millimetres or degrees).
+/// Relative errors are in percent of the truth. Where the truth is zero there are none, and everything is in the
+/// quantity's own unit (millimetres or degrees).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Tally {
+pub struct ErrorTally {
     /// Number of draws.
     pub n: usize,
     relative: bool,
-    signed: Sums,
-    absolute: Sums,
-    own: Sums,
-    spread: Option<Sums>,
+    signed: Moments,
+    absolute: Moments,
+    own: Moments,
+    spread: Option<Moments>,
 }
 
-/// The figures of the paper's section 7, of one quantity over draws.
+/// The statistics of the paper's section 7, of one quantity over draws.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Figures {
+pub struct ErrorStatistics {
     /// Mean of (estimate − truth)/truth, in percent; `None` where the truth is zero.
     pub erm_signed: Option<f64>,
     /// Mean of |estimate − truth|/|truth|, in percent; `None` where the truth is zero.
@@ -61,7 +61,14 @@ pub struct Figures {
     pub n: usize,
 }
 
-impl Tally {
+impl ErrorStatistics {
+    /// Mean of |error|: in percent of the truth, or in millimetres or degrees where the truth is zero.
+    pub fn mean_error(&self) -> f64 {
+        self.erm_abs.unwrap_or(self.eam)
+    }
+}
+
+impl ErrorTally {
     /// One draw of a component of φ: `scale` turns its unit into millimetres or degrees.
     pub fn component(estimate: f64, truth: f64, scale: f64) -> Self {
         let error = estimate - truth;
@@ -70,9 +77,9 @@ impl Tally {
         Self {
             n: 1,
             relative,
-            signed: Sums::of(signed),
-            absolute: Sums::of(signed.abs()),
-            own: Sums::of((scale * error).abs()),
+            signed: Moments::of(signed),
+            absolute: Moments::of(signed.abs()),
+            own: Moments::of((scale * error).abs()),
             spread: None,
         }
     }
@@ -85,10 +92,10 @@ impl Tally {
         Some(Self {
             n: 1,
             relative: true,
-            signed: Sums::of(figures.erm_signed_percent?),
-            absolute: Sums::of(figures.erm_abs_percent?),
-            own: Sums::of(1e3 * figures.eam),
-            spread: figures.std_percent.map(Sums::of),
+            signed: Moments::of(figures.erm_signed_percent?),
+            absolute: Moments::of(figures.erm_abs_percent?),
+            own: Moments::of(1e3 * figures.eam),
+            spread: figures.std_percent.map(Moments::of),
         })
     }
 
@@ -109,10 +116,10 @@ impl Tally {
         self
     }
 
-    /// The figures; `None` without a draw.
-    pub fn figures(&self) -> Option<Figures> {
+    /// The statistics of section 7; `None` without a draw.
+    pub fn statistics(&self) -> Option<ErrorStatistics> {
         let n = self.n as f64;
-        (self.n > 0).then(|| Figures {
+        (self.n > 0).then(|| ErrorStatistics {
             erm_signed: self.relative.then_some(self.signed.sum / n),
             erm_abs: self.relative.then_some(self.absolute.sum / n),
             eam: self.own.sum / n,
@@ -130,8 +137,8 @@ mod tests {
     #[test]
     fn figures_of_a_component() {
         // Errors +2, −1, +1 mm of a truth of 10 mm.
-        let draws = [0.012, 0.009, 0.011].map(|t| Tally::component(t, 0.010, 1e3));
-        let figures = draws[0].merged(&draws[1]).merged(&draws[2]).figures().unwrap();
+        let draws = [0.012, 0.009, 0.011].map(|t| ErrorTally::component(t, 0.010, 1e3));
+        let figures = draws[0].merged(&draws[1]).merged(&draws[2]).statistics().unwrap();
         assert!((figures.erm_signed.unwrap() - 20.0 / 3.0).abs() < 1e-9);
         assert!((figures.erm_abs.unwrap() - 40.0 / 3.0).abs() < 1e-9);
         assert!((figures.eam - 4.0 / 3.0).abs() < 1e-9 && figures.n == 3);
@@ -142,8 +149,10 @@ mod tests {
 
     #[test]
     fn a_truth_of_zero_has_no_relative_error() {
-        let figures =
-            Tally::component(2e-3, 0.0, 1e3).merged(&Tally::component(-4e-3, 0.0, 1e3)).figures().unwrap();
+        let figures = ErrorTally::component(2e-3, 0.0, 1e3)
+            .merged(&ErrorTally::component(-4e-3, 0.0, 1e3))
+            .statistics()
+            .unwrap();
         assert_eq!((figures.erm_signed, figures.erm_abs), (None, None));
         assert!((figures.eam - 3.0).abs() < 1e-12 && (figures.standard_error.unwrap() - 1.0).abs() < 1e-12);
         assert!((figures.std.unwrap() - 18f64.sqrt()).abs() < 1e-12);
@@ -152,11 +161,11 @@ mod tests {
     #[test]
     fn points_near_zero_count_for_the_mean_error_only() {
         let pairs = [(1.1, 1.0), (0.8, 1.0), (0.5, 0.01)];
-        let figures = Tally::depth_velocity(&pairs, 0.1).unwrap().figures().unwrap();
+        let figures = ErrorTally::depth_velocity(&pairs, 0.1).unwrap().statistics().unwrap();
         assert!((figures.erm_abs.unwrap() - 15.0).abs() < 1e-9);
         assert!((figures.erm_signed.unwrap() + 5.0).abs() < 1e-9);
         assert!((figures.eam - 1e3 * 0.79 / 3.0).abs() < 1e-9);
         assert!((figures.std.unwrap() - 450f64.sqrt()).abs() < 1e-9);
-        assert!(Tally::depth_velocity(&[(1.0, 0.0)], 0.1).is_none());
+        assert!(ErrorTally::depth_velocity(&[(1.0, 0.0)], 0.1).is_none());
     }
 }

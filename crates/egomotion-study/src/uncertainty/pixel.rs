@@ -1,64 +1,64 @@
-//! What both approaches measure at one pixel of the synthetic world, without noise.
+//! The measurements of both approaches at one pixel of the synthetic world, without noise.
 
 use nalgebra::Vector3;
 
-use crate::world::{When, World};
+use crate::synthetic::{FrameTime, SyntheticWorld};
 use egomotion::geometry::Gaussian;
 use egomotion::geometry::perspective::image_flow;
 use egomotion::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 
 /// Disparity at a pixel and at its four neighbours, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stencil {
+pub(super) struct Stencil {
     /// At the pixel.
-    pub centre: f64,
+    pub(super) centre: f64,
     /// One column to the left.
-    pub left: f64,
+    pub(super) left: f64,
     /// One column to the right.
-    pub right: f64,
+    pub(super) right: f64,
     /// One row up.
-    pub above: f64,
+    pub(super) above: f64,
     /// One row down.
-    pub below: f64,
+    pub(super) below: f64,
 }
 
 /// The exact measurements at one pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Exact {
+pub(super) struct ExactPixel {
     /// Pixel (u, v).
-    pub pixel: (usize, usize),
+    pub(super) pixel: (usize, usize),
     /// Image coordinates (x, y), in pixels.
-    pub image_px: (f64, f64),
+    pub(super) image_px: (f64, f64),
     /// Depth Z at t, in metres.
-    pub depth_m: f64,
+    pub(super) depth_m: f64,
     /// Disparity at t − 1, in pixels.
-    pub before: f64,
+    pub(super) before: f64,
     /// Disparities at t.
-    pub now: Stencil,
+    pub(super) now: Stencil,
     /// Disparities at t + 1.
-    pub after: Stencil,
+    pub(super) after: Stencil,
     /// Flow (vx, vy) of the left image, in pixels per interval.
-    pub flow: [f64; 2],
+    pub(super) flow: [f64; 2],
     /// Flow vx of the right image, in pixels per interval.
-    pub flow_right_x: f64,
+    pub(super) flow_right_x: f64,
     /// Displacement (x′ − x, y′ − y) of the point, in pixels.
-    pub displacement: [f64; 2],
+    pub(super) displacement: [f64; 2],
     /// Disparity d′ of the point after the motion, in pixels.
-    pub moved: f64,
+    pub(super) moved: f64,
 }
 
-/// Standard deviations of what is measured, in pixels.
+/// Standard deviations of the measurements at a pixel, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Noise {
+pub(super) struct PixelNoise {
     /// Of every disparity.
-    pub disparity_px: f64,
+    pub(super) disparity_px: f64,
     /// Of every component of flow, and of the later end of a displacement.
-    pub flow_px: f64,
+    pub(super) flow_px: f64,
 }
 
-impl Noise {
+impl PixelNoise {
     /// Variances (σ²_d, σ²_v), in pixels².
-    pub fn variances(&self) -> (f64, f64) {
+    pub(super) fn variances(&self) -> (f64, f64) {
         (self.disparity_px.powi(2), self.flow_px.powi(2))
     }
 }
@@ -77,22 +77,22 @@ impl Stencil {
     }
 
     /// Central differences (d_x, d_y), in pixels per pixel.
-    pub fn gradient(&self) -> [f64; 2] {
+    pub(super) fn gradient(&self) -> [f64; 2] {
         [0.5 * (self.right - self.left), 0.5 * (self.below - self.above)]
     }
 }
 
-impl Exact {
+impl ExactPixel {
     /// The measurements at the pixel with row-major `index`, usable or not; `None` at the image's border,
     /// and where nothing is seen.
-    pub fn at(world: &World, index: usize) -> Option<Self> {
+    pub(super) fn at(world: &SyntheticWorld, index: usize) -> Option<Self> {
         let (rig, phi) = (&world.rig, &world.phi);
         let (u, v) = (index % rig.width_px, index / rig.width_px);
         if u == 0 || u + 1 == rig.width_px {
             return None;
         }
         let at = |when| Stencil::of(world.disparity(when), index, rig.width_px);
-        let (before, now, after) = (at(When::Before)?, at(When::Now)?, at(When::After)?);
+        let (before, now, after) = (at(FrameTime::Before)?, at(FrameTime::Now)?, at(FrameTime::After)?);
         let (x, y) = rig.image_from_pixel(u as f64, v as f64);
         let xyd = Vector3::new(x, y, now.centre);
         let point = rig.point(&xyd)?;
@@ -113,8 +113,8 @@ impl Exact {
         })
     }
 
-    /// What the differential DCCE measures: central differences, so σ²_di = ½ σ²_d.
-    pub fn depth_flow(&self, noise: &Noise) -> DepthFlow {
+    /// The measurement of the differential DCCE: central differences, so σ²_di = ½ σ²_d.
+    pub(super) fn depth_flow(&self, noise: &PixelNoise) -> DepthFlow {
         let (d, v) = noise.variances();
         let [dx, dy] = self.now.gradient();
         let dt = 0.5 * (self.after.centre - self.before);
@@ -126,8 +126,8 @@ impl Exact {
         }
     }
 
-    /// What the discrete DCCE measures: disparity at t and t′, and central differences at t′.
-    pub fn depth_track(&self, noise: &Noise) -> DepthTrack {
+    /// The measurement of the discrete DCCE: disparity at t and t′, and central differences at t′.
+    pub(super) fn depth_track(&self, noise: &PixelNoise) -> DepthTrack {
         let (d, v) = noise.variances();
         let [dx, dy] = self.after.gradient();
         DepthTrack {
@@ -141,8 +141,18 @@ impl Exact {
         }
     }
 
-    /// What the differential DV measures.
-    pub fn stereo_flow(&self, noise: &Noise) -> StereoFlow {
+    /// The measurement of the discrete DCCE with the variances that section 5.6 takes.
+    ///
+    /// It takes σ²_di = ½ σ²_d for every derivative; for the difference d′ − d that is a quarter of the truth.
+    pub(super) fn depth_track_as_in_5_6(&self, noise: &PixelNoise) -> DepthFlow {
+        let track = self.depth_track(noise);
+        let mut printed = track.as_printed();
+        printed.disparity.cov[(3, 3)] = 0.5 * track.disparity.cov[(0, 0)];
+        printed
+    }
+
+    /// The measurement of the differential DV.
+    pub(super) fn stereo_flow(&self, noise: &PixelNoise) -> StereoFlow {
         let (d, v) = noise.variances();
         StereoFlow {
             x_px: self.image_px.0,
@@ -154,8 +164,8 @@ impl Exact {
         }
     }
 
-    /// What the discrete DV measures: the earlier end is a pixel, the later one is tracked.
-    pub fn stereo_track(&self, noise: &Noise) -> StereoTrack {
+    /// The measurement of the discrete DV: the earlier end is a pixel, the later one is tracked.
+    pub(super) fn stereo_track(&self, noise: &PixelNoise) -> StereoTrack {
         let (d, v) = noise.variances();
         let (x, y) = self.image_px;
         let [dx, dy] = self.displacement;

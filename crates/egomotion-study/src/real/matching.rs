@@ -1,4 +1,4 @@
-//! What is measured in three stereo frames t−1, t, t+1, and the observations of both approaches at t.
+//! Disparity and flow matched in three stereo frames t−1, t, t+1, and the observations of both approaches at t.
 
 use nalgebra::Vector2;
 use thiserror::Error;
@@ -12,14 +12,16 @@ use egomotion::observe::{
 };
 use egomotion::sim::StereoImages;
 
-/// Levels of the pyramids that flow is found in.
+/// Levels of the pyramids in which flow is found: each more doubles the motion that can be followed.
 const PYRAMID_LEVELS: usize = 5;
-/// Beyond one pixel of disparity per pixel a stencil straddles a depth edge.
-const STEEPEST: f64 = 1.0;
+/// Gradient of disparity, in pixels per pixel, from which on a stencil is taken to straddle a depth edge.
+///
+/// A smaller limit leaves out slanted surfaces too, a larger one admits differences across edges.
+const EDGE_GRADIENT: f64 = 1.0;
 
-/// Why nothing could be measured.
+/// Why frames could not be matched.
 #[derive(Debug, Clone, PartialEq, Error)]
-pub enum Unmeasured {
+pub enum MatchingError {
     /// A pair's images differ in size.
     #[error(transparent)]
     Disparity(#[from] DisparityError),
@@ -30,26 +32,30 @@ pub enum Unmeasured {
 
 /// Disparity and flow of three stereo frames, nothing of which knows how the cameras moved.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
+pub(super) struct MatchedFrames {
     /// The rig.
-    pub rig: StereoRig,
+    pub(super) rig: StereoRig,
     /// Disparity at t−1, t, t+1 as it was matched.
-    pub disparity: [DisparityMap; 3],
+    pub(super) disparity: [DisparityMap; 3],
     /// The same, rounded to a step of disparity.
-    pub rounded: [DisparityMap; 3],
+    pub(super) rounded: [DisparityMap; 3],
     /// Displacement in the left image from t to t+1.
-    pub flow: FlowField,
+    pub(super) flow: FlowField,
     /// Image velocity at t in the left and the right image: half of what lies between t−1 and t+1.
-    pub velocity: [FlowField; 2],
+    pub(super) velocity: [FlowField; 2],
 }
 
-impl Measured {
+impl MatchedFrames {
     /// Match three frames; disparity is also rounded to `levels` steps in a pixel.
     ///
     /// # Errors
-    /// [`Unmeasured`] when the images differ in size.
-    pub fn new(frames: &[StereoImages; 3], rig: &StereoRig, levels: f32) -> Result<Self, Unmeasured> {
-        // Gradients and differences are taken of what is measured, not of what is filled in.
+    /// [`MatchingError`] when the images differ in size.
+    pub(super) fn new(
+        frames: &[StereoImages; 3],
+        rig: &StereoRig,
+        levels: f32,
+    ) -> Result<Self, MatchingError> {
+        // Gradients and differences are those of matched disparities, not of filled ones.
         let mut matcher =
             DisparityMatcher::new(DisparityOptions { fill: false, ..DisparityOptions::default() });
         let [a, b, c] = frames;
@@ -71,20 +77,20 @@ impl Measured {
     }
 
     /// The rounded maps of t and t+1 with the displacement between them: the discrete approach.
-    pub fn pair(&self) -> DensePair<'_> {
+    pub(super) fn pair(&self) -> DensePair<'_> {
         let [_, before, after] = &self.rounded;
         DensePair { rig: &self.rig, before, after, flow: &self.flow, flow_right: None, given: false }
     }
 
     /// Disparity, its central differences in space and in time, and the image velocity, at a pixel at t: (7).
-    pub fn depth_flow(&self, u: usize, v: usize) -> Option<DepthFlow> {
+    pub(super) fn depth_flow(&self, u: usize, v: usize) -> Option<DepthFlow> {
         let [before, now, after] = &self.rounded;
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
         let (d, variance) = self.disparity_at(now, u, v)?;
         let (du, dv) = now.shift.gradient(u, v)?;
         let (dx, dy) = (f64::from(du), f64::from(dv) / self.rig.aspect());
         let ends = f64::from(after.shift.get(u, v)?) - f64::from(before.shift.get(u, v)?);
-        if dx.abs().max(dy.abs()) >= STEEPEST {
+        if dx.abs().max(dy.abs()) >= EDGE_GRADIENT {
             return None;
         }
         let half = 0.5 * variance;
@@ -99,7 +105,7 @@ impl Measured {
     /// Disparity and the image velocity of both cameras at a pixel at t: (9), (14) and (3).
     ///
     /// The right camera's is read at the measured place of the same point, x − d.
-    pub fn stereo_flow(&self, u: usize, v: usize) -> Option<StereoFlow> {
+    pub(super) fn stereo_flow(&self, u: usize, v: usize) -> Option<StereoFlow> {
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
         let (d, variance) = self.disparity_at(&self.rounded[1], u, v)?;
         let left = self.velocity_at(u, v)?;

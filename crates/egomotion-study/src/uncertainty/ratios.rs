@@ -1,19 +1,20 @@
-//! DCCE against DV over a whole image, and what the printed formulas leave out.
+//! Ratios of variances over a whole image: DCCE against DV, and printed against corrected formulas.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::STEPS;
 use super::coefficients::Variances;
-use super::exact::{Exact, Noise};
+use super::pixel::{ExactPixel, PixelNoise};
 use crate::Table;
-use crate::world::World;
+use crate::sequences::PAPER_STEPS;
+use crate::synthetic::SyntheticWorld;
 use egomotion::metrics::quantile;
+use egomotion::pipeline::Approach;
 use egomotion::sim::Sequence;
 
 /// Median of a quantity over the usable pixels, with the middle 90 % of it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Spread {
+pub struct QuantileRange {
     /// Median.
     pub median: f64,
     /// 5 % lie below.
@@ -24,7 +25,7 @@ pub struct Spread {
 
 /// The methods' variances relative to each other with equal noise on disparity and flow; first order.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Comparison {
+pub struct VarianceRatios {
     /// Sequence.
     pub sequence: String,
     /// Multiple of its motion.
@@ -32,41 +33,41 @@ pub struct Comparison {
     /// Usable pixels.
     pub pixels: usize,
     /// Length of the flow |v|, in pixels per interval.
-    pub flow_px: Spread,
+    pub flow_px: QuantileRange,
     /// (39c)/(44).
-    pub differential: Spread,
+    pub differential: QuantileRange,
     /// (39c)/(44) relative to (1 + |v|²)/4.
-    pub differential_rule: Spread,
+    pub differential_rule: QuantileRange,
     /// Share of the pixels with (39c) < (44).
     pub differential_wins: f64,
     /// Share of the pixels with |v| < √3 px.
     pub slow: f64,
     /// (47c)/(50).
-    pub discrete: Spread,
+    pub discrete: QuantileRange,
     /// (47c)/(50) relative to 1 + |Δ|²/4.
-    pub discrete_rule: Spread,
+    pub discrete_rule: QuantileRange,
     /// Share of the pixels with (47c) < (50).
     pub discrete_wins: f64,
     /// (39)/(39c) at the usable pixels.
-    pub printed: Spread,
+    pub printed: QuantileRange,
     /// Largest (39)/(39c) or its inverse at the pixels whose stencil crosses an edge.
     pub printed_at_edges: f64,
     /// (47)/(47c), σ²_dt = ½ σ²_d taken as section 5.6 does.
-    pub printed_discrete: Spread,
+    pub printed_discrete: QuantileRange,
 }
 
-/// One comparison for each multiple of the motion, at the sequence's first pose.
-pub fn over_steps(sequence: &Sequence) -> Vec<Comparison> {
+/// The ratios for each multiple of the motion, at the sequence's first pose.
+pub(super) fn over_steps(sequence: &Sequence) -> Vec<VarianceRatios> {
     let Some(phi) = sequence.phi_cyclopean(0) else { return Vec::new() };
     let at = |&step: &f64| {
-        let world = World::new(&sequence.scene, &sequence.rig, &phi, 0, step);
-        compare(&world, &sequence.name, step)
+        let world = SyntheticWorld::new(&sequence.scene, &sequence.rig, &phi, 0, step);
+        over_image(&world, &sequence.name, step)
     };
-    STEPS.iter().filter_map(at).collect()
+    PAPER_STEPS.iter().filter_map(at).collect()
 }
 
-/// Everything that is compared at one pixel.
-struct Compared {
+/// The ratios at one pixel.
+struct PixelRatios {
     flow_px: f64,
     differential: f64,
     discrete: f64,
@@ -75,11 +76,11 @@ struct Compared {
     printed_discrete: f64,
 }
 
-fn at_pixel(world: &World, index: usize) -> Option<Compared> {
-    let at = Exact::at(world, index)?;
-    let noise = Noise { disparity_px: 1.0, flow_px: 1.0 };
+fn at_pixel(world: &SyntheticWorld, index: usize) -> Option<PixelRatios> {
+    let at = ExactPixel::at(world, index)?;
+    let noise = PixelNoise { disparity_px: 1.0, flow_px: 1.0 };
     let Variances { printed, corrected } = Variances::of(&at, &noise, world.rig.depth_disparity_product());
-    Some(Compared {
+    Some(PixelRatios {
         flow_px: at.flow[0].hypot(at.flow[1]),
         differential: corrected[0] / corrected[1],
         discrete: corrected[2] / corrected[3],
@@ -89,26 +90,26 @@ fn at_pixel(world: &World, index: usize) -> Option<Compared> {
     })
 }
 
-fn compare(world: &World, sequence: &str, step: f64) -> Option<Comparison> {
-    let usable: Vec<usize> = world.pixels().iter().filter(|p| p.differential).map(|p| p.index).collect();
-    let points: Vec<Compared> = usable.par_iter().filter_map(|&i| at_pixel(world, i)).collect();
-    let spread = |of: fn(&Compared) -> f64| {
+fn over_image(world: &SyntheticWorld, sequence: &str, step: f64) -> Option<VarianceRatios> {
+    let usable: Vec<usize> = world.usable_in(Approach::Differential).map(|p| p.index).collect();
+    let points: Vec<PixelRatios> = usable.par_iter().filter_map(|&i| at_pixel(world, i)).collect();
+    let spread = |of: fn(&PixelRatios) -> f64| {
         let values: Vec<f64> = points.iter().map(of).collect();
-        Some(Spread {
+        Some(QuantileRange {
             median: quantile(&values, 0.5)?,
             lo: quantile(&values, 0.05)?,
             hi: quantile(&values, 0.95)?,
         })
     };
     let share =
-        |of: fn(&Compared) -> bool| points.iter().filter(|p| of(p)).count() as f64 / points.len() as f64;
+        |of: fn(&PixelRatios) -> bool| points.iter().filter(|p| of(p)).count() as f64 / points.len() as f64;
     let all = 0..world.rig.width_px * world.rig.height_px;
     let edges = all.into_par_iter().filter(|i| usable.binary_search(i).is_err());
     let printed_at_edges = edges
         .filter_map(|i| at_pixel(world, i))
         .map(|p| p.printed.max(p.printed.recip()))
         .reduce(|| 1.0, f64::max);
-    Some(Comparison {
+    Some(VarianceRatios {
         sequence: sequence.to_owned(),
         step,
         pixels: points.len(),
@@ -126,8 +127,8 @@ fn compare(world: &World, sequence: &str, step: f64) -> Option<Comparison> {
     })
 }
 
-/// All comparisons.
-pub fn table(compared: &[&Comparison]) -> Table {
+/// All ratios.
+pub(super) fn table(ratios: &[&VarianceRatios]) -> Table {
     let mut table = Table::new(
         "dcce-against-dv",
         "Variance of VZ per pixel: DCCE against DV with equal noise of disparity and flow",
@@ -155,7 +156,7 @@ pub fn table(compared: &[&Comparison]) -> Table {
             ("printed_discrete", "(47)/(47c), ½σ²_d"),
         ],
     );
-    table.rows = compared
+    table.rows = ratios
         .iter()
         .map(|c| {
             vec![

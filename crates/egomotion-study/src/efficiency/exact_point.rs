@@ -1,34 +1,35 @@
-//! Exact points, and all that one motion does to each: what measurements are made of.
+//! Exact points, and what one motion does to each: the truth to which noise is added.
 
 use nalgebra::{Vector2, Vector3};
 
-use crate::world::{UsablePixel, When, World};
+use crate::synthetic::{FrameTime, SyntheticWorld, UsablePixel};
 use egomotion::geometry::{StereoRig, Twist};
 
 /// An exact point of the left image. Disparities and their slopes are in pixels and pixels per pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Site {
+pub(super) struct ExactPoint {
     /// (x, y, d) at t.
-    pub xyd: Vector3<f64>,
+    pub(super) xyd: Vector3<f64>,
     /// (x, y, d) at t′.
-    pub later: Vector3<f64>,
+    pub(super) later: Vector3<f64>,
     /// (vx, vy, ḋ) at t, of the point, per interval.
-    pub rate: Vector3<f64>,
+    pub(super) rate: Vector3<f64>,
     /// Slope (d_x, d_y) of the surface's disparity at t.
-    pub slope: Vector2<f64>,
+    pub(super) slope: Vector2<f64>,
     /// The same at t′.
-    pub slope_later: Vector2<f64>,
+    pub(super) slope_later: Vector2<f64>,
     /// Disparity at t′ at the same place of the image.
-    pub later_here: f64,
+    pub(super) later_here: f64,
     /// Its rate d_t at the same place of the image.
-    pub rate_here: f64,
+    pub(super) rate_here: f64,
 }
 
-impl Site {
+impl ExactPoint {
     /// A pixel of the synthetic world.
-    pub fn of_world(world: &World, pixel: &UsablePixel) -> Self {
+    pub(super) fn of_world(world: &SyntheticWorld, pixel: &UsablePixel) -> Self {
         let width = world.rig.width_px;
-        let at = |when: When, index: usize| world.disparity(when).get(index).copied().unwrap_or(f64::NAN);
+        let at =
+            |when: FrameTime, index: usize| world.disparity(when).get(index).copied().unwrap_or(f64::NAN);
         let i = pixel.index;
         let slope = |when| {
             let half = |a: usize, b: usize| 0.5 * (at(when, a) - at(when, b));
@@ -39,17 +40,17 @@ impl Site {
             xyd: pixel.xyd,
             later: pixel.later_xyd,
             rate: Vector3::new(flow.x, flow.y, flow.x - pixel.flow_right_x),
-            slope: slope(When::Now),
-            slope_later: slope(When::After),
-            later_here: at(When::After, i),
-            rate_here: 0.5 * (at(When::After, i) - at(When::Before, i)),
+            slope: slope(FrameTime::Now),
+            slope_later: slope(FrameTime::After),
+            later_here: at(FrameTime::After, i),
+            rate_here: 0.5 * (at(FrameTime::After, i) - at(FrameTime::Before, i)),
         }
     }
 
     /// The point of the plane `normal` · P = `offset_m` that is seen at (x, y); `None` behind the camera.
     ///
     /// The disparity of a plane is linear in the image: d = b (normal · (x, y, f))/`offset_m`.
-    pub fn of_plane(
+    pub(super) fn of_plane(
         rig: &StereoRig,
         phi: &Twist,
         normal: &Vector3<f64>,
@@ -79,7 +80,7 @@ impl Site {
     }
 
     /// The same point found somewhere else at t′, and with another rate; its surface as steep as it was.
-    pub fn carried(mut self, later: Vector3<f64>, rate: Vector3<f64>) -> Self {
+    pub(super) fn carried(mut self, later: Vector3<f64>, rate: Vector3<f64>) -> Self {
         self.later_here = later.z - self.slope_later.dot(&(later - self.xyd).xy());
         self.rate_here = rate.z - self.slope.dot(&rate.xy());
         Self { later, rate, ..self }
@@ -95,14 +96,14 @@ mod tests {
         let rig = StereoRig::new(400.0, (159.5, 119.5), 0.13, (320, 240)).unwrap();
         let phi = Twist { t: Vector3::new(0.01, -0.02, -0.05), omega: Vector3::new(0.004, -0.006, 0.002) };
         let (normal, offset) = (Vector3::new(0.2, -0.3, 1.0), 3.0);
-        let site = |x, y| Site::of_plane(&rig, &phi, &normal, offset, (x, y)).unwrap();
-        let found = site(40.0, -25.0);
+        let point = |x, y| ExactPoint::of_plane(&rig, &phi, &normal, offset, (x, y)).unwrap();
+        let found = point(40.0, -25.0);
         assert!((normal.dot(&rig.point(&found.xyd).unwrap()) - offset).abs() < 1e-12);
         // The place at t′ lies on the moved plane, whose disparity here and slope tell its own.
         let step = (found.later - found.xyd).xy();
         assert!((found.later_here + found.slope_later.dot(&step) - found.later.z).abs() < 1e-12);
         // For a hundredth of the motion, displacement is velocity.
-        let little = Site::of_plane(&rig, &phi.scaled(1e-6), &normal, offset, (40.0, -25.0)).unwrap();
+        let little = ExactPoint::of_plane(&rig, &phi.scaled(1e-6), &normal, offset, (40.0, -25.0)).unwrap();
         assert!((little.later - little.xyd - little.rate).norm() < 1e-9);
         assert!((little.later_here - little.xyd.z - little.rate_here).abs() < 1e-9);
         // Carried to where it goes anyway, nothing changes.

@@ -1,19 +1,28 @@
-//! Formulas against draws as tables and figures.
+//! Variance formulas against draws, as tables and figures.
 
-use super::formula::{Inputs, Kind};
-use super::trial::Case;
-use crate::uncertainty::formula::Family;
+use super::case::VarianceCase;
+use super::formula::{Family, FormulaKind, Inputs};
 use crate::{Axis, Cell, Content, Figure, Line, Panel, Point, Series, Table};
 use egomotion::metrics::quantile;
 
-/// σ_d/d up to which first order in disparity is promised to hold.
-const SMALL: f64 = 0.02;
-/// Ratios within which it is said to hold.
-const BAND: (f64, f64) = (0.97, 1.03);
+/// Relative noise of disparity σ_d/d up to which first order is promised to hold.
+///
+/// The second order of 1/d² is 10 (σ_d/d)², 0.4 % at this value; a larger one promises what formulas do not keep.
+const FIRST_ORDER_LIMIT: f64 = 0.02;
+/// Ratios of empirical to predicted variance within which a formula is said to hold: 3 % to each side.
+const HOLDING_RATIOS: (f64, f64) = (0.97, 1.03);
+/// Ends of the line of a ratio in the figure, in σ_d/d.
+const RATIO_LINE: [f64; 2] = [5e-4, 0.12];
+/// Name of the axis of ratios.
+const RATIO_AXIS: &str = "empirical/predicted";
+/// Least share of the product of noises over first order that is shown: draws find it to about a third of that.
+const LEAST_PRODUCT: f64 = 0.01;
+/// Largest share of the product of noises over first order that its rule is drawn to.
+const LARGEST_PRODUCT: f64 = 0.5;
 
-impl Kind {
+impl FormulaKind {
     /// Its word in tables and legends.
-    pub fn word(self) -> &'static str {
+    pub(super) fn word(self) -> &'static str {
         match self {
             Self::Printed => "printed",
             Self::FirstOrder => "first order",
@@ -25,7 +34,7 @@ impl Kind {
 
 impl Inputs {
     /// Its word in tables.
-    pub fn word(self) -> &'static str {
+    pub(super) fn word(self) -> &'static str {
         match self {
             Self::Raw => "raw",
             Self::Independent => "independent",
@@ -34,7 +43,7 @@ impl Inputs {
 }
 
 /// Every case.
-pub fn data(cases: &[&Case]) -> Table {
+pub(super) fn data(cases: &[&VarianceCase]) -> Table {
     let mut table = Table::new(
         "variances",
         "Every variance formula against draws",
@@ -69,7 +78,7 @@ pub fn data(cases: &[&Case]) -> Table {
     table
 }
 
-fn row(case: &Case) -> Vec<Cell> {
+fn row(case: &VarianceCase) -> Vec<Cell> {
     let place = case.place.as_ref();
     let (lo, hi) = case.interval();
     vec![
@@ -98,9 +107,9 @@ fn row(case: &Case) -> Vec<Cell> {
 }
 
 /// The cases of one formula, in the order in which formulas first occur.
-fn groups<'a>(cases: &[&'a Case]) -> Vec<Vec<&'a Case>> {
-    let key = |c: &Case| (c.formula.clone(), c.kind, c.inputs, c.family);
-    let mut groups: Vec<Vec<&Case>> = Vec::new();
+fn groups<'a>(cases: &[&'a VarianceCase]) -> Vec<Vec<&'a VarianceCase>> {
+    let key = |c: &VarianceCase| (c.formula.clone(), c.kind, c.inputs, c.family);
+    let mut groups: Vec<Vec<&VarianceCase>> = Vec::new();
     for &case in cases.iter().filter(|case| case.place.is_some()) {
         match groups.iter_mut().find(|group| group.first().is_some_and(|first| key(first) == key(case))) {
             Some(group) => group.push(case),
@@ -111,7 +120,7 @@ fn groups<'a>(cases: &[&'a Case]) -> Vec<Vec<&'a Case>> {
 }
 
 /// Ratios of each formula, at small and at large relative noise.
-pub fn summary(cases: &[&Case]) -> Table {
+pub(super) fn summary(cases: &[&VarianceCase]) -> Table {
     let mut table = Table::new(
         "variances-summary",
         "Empirical over predicted variance, per formula",
@@ -128,15 +137,18 @@ pub fn summary(cases: &[&Case]) -> Table {
             ("min", "least ratio"),
             ("median", "median ratio"),
             ("max", "largest ratio"),
-            ("inside_percent", "within .97–1.03 (%)"),
+            ("inside_percent", "within 0.97–1.03 (%)"),
         ],
     );
     for group in groups(cases) {
         for (name, small) in [("at most .02", true), ("beyond .02", false)] {
-            let of: Vec<f64> =
-                group.iter().filter(|c| (c.relative() <= SMALL) == small).map(|c| c.ratio()).collect();
+            let of: Vec<f64> = group
+                .iter()
+                .filter(|c| (c.relative() <= FIRST_ORDER_LIMIT) == small)
+                .map(|c| c.ratio())
+                .collect();
             let (Some(first), Some(median)) = (group.first(), quantile(&of, 0.5)) else { continue };
-            let inside = of.iter().filter(|r| (BAND.0..=BAND.1).contains(*r)).count();
+            let inside = of.iter().filter(|r| (HOLDING_RATIOS.0..=HOLDING_RATIOS.1).contains(*r)).count();
             table.rows.push(vec![
                 first.family.name().into(),
                 first.formula.as_str().into(),
@@ -155,7 +167,7 @@ pub fn summary(cases: &[&Case]) -> Table {
 }
 
 /// (52) over all points of a view without any noise: a mean over places, not over repeats.
-pub fn rounding(cases: &[&Case]) -> Table {
+pub(super) fn rounding(cases: &[&VarianceCase]) -> Table {
     let mut table = Table::new(
         "rounding",
         "Rounding error of disparity over the points of a view, (52)",
@@ -184,31 +196,31 @@ pub fn rounding(cases: &[&Case]) -> Table {
     table
 }
 
-/// Name of the axis of ratios.
-const RATIO: &str = "empirical/predicted";
-
 /// Whether ratios of this estimator's printed formulas spread over decades.
 fn wide(family: &Family) -> bool {
     matches!(family, Family::DcceDiscrete | Family::Rounding)
 }
 
 /// Ratio against σ_d/d, a panel for each estimator.
-pub fn figure(cases: &[&Case]) -> Figure {
-    let raw: Vec<&Case> =
+pub(super) fn figure(cases: &[&VarianceCase]) -> Figure {
+    let raw: Vec<&VarianceCase> =
         cases.iter().copied().filter(|c| c.inputs == Inputs::Raw && c.place.is_some()).collect();
     let panel = |family: &Family| {
-        let of: Vec<&Case> = raw.iter().copied().filter(|case| case.family == *family).collect();
-        let bounds = [BAND.0, 1.0, BAND.1].map(|ratio| reference("1 ± .03", &[(5e-4, ratio), (0.12, ratio)]));
-        let kinds = [Kind::Printed, Kind::FirstOrder, Kind::SecondOrder, Kind::Corrected];
+        let of: Vec<&VarianceCase> = raw.iter().copied().filter(|case| case.family == *family).collect();
+        let bounds = [HOLDING_RATIOS.0, 1.0, HOLDING_RATIOS.1].map(|ratio| {
+            Series::through("1 ± 0.03", Line::Reference, RATIO_LINE.map(|relative| (relative, ratio)))
+        });
+        let kinds =
+            [FormulaKind::Printed, FormulaKind::FirstOrder, FormulaKind::SecondOrder, FormulaKind::Corrected];
         let series = kinds.into_iter().filter_map(|kind| {
-            let found: Vec<&Case> = of.iter().copied().filter(|case| case.kind == kind).collect();
+            let found: Vec<&VarianceCase> = of.iter().copied().filter(|case| case.kind == kind).collect();
             marks(kind.word(), &found, |case| (case.relative(), case.ratio()))
         });
         Panel {
             title: family.name().to_owned(),
             content: Content::Plot {
                 x: Axis::log("σ_d/d"),
-                y: if wide(family) { Axis::log(RATIO) } else { Axis::linear(RATIO) },
+                y: if wide(family) { Axis::log(RATIO_AXIS) } else { Axis::linear(RATIO_AXIS) },
                 series: bounds.into_iter().chain(series).collect(),
             },
         }
@@ -218,7 +230,7 @@ pub fn figure(cases: &[&Case]) -> Figure {
         title: "Variance formulas against draws".to_owned(),
         caption: "Empirical over predicted variance at random places of A, B and C, against the relative \
                   noise of disparity; bars are ± 2 standard errors. Corrected variances lie within 3 % up to \
-                  σ_d/d = .02; beyond, second order carries on. Printed formulas that miss: (39) by the product \
+                  σ_d/d = 0.02; beyond, second order carries on. Printed formulas that miss: (39) by the product \
                   of noises, (47) by that of d_t with ½σ²_d and at large motion, (49) at large motion, (52) \
                   where the noise is less than half a level."
             .to_owned(),
@@ -227,15 +239,12 @@ pub fn figure(cases: &[&Case]) -> Figure {
     }
 }
 
-/// Least share of the product that is shown: draws find it to about a third of that.
-const LEAST_PRODUCT: f64 = 0.01;
-
-/// What (39c) and (47c) leave out: the excess of the empirical variance against the product of noises.
-pub fn product_figure(cases: &[&Case]) -> Figure {
-    let mut found: [Vec<(&Case, f64)>; 2] = Default::default();
+/// The product of noises that (39c) and (47c) leave out, against the excess of the empirical variance.
+pub(super) fn product_figure(cases: &[&VarianceCase]) -> Figure {
+    let mut found: [Vec<(&VarianceCase, f64)>; 2] = Default::default();
     for pair in cases.windows(2) {
         let &[first, next] = pair else { continue };
-        if first.kind != Kind::FirstOrder || first.relative() > SMALL {
+        if first.kind != FormulaKind::FirstOrder || first.relative() > FIRST_ORDER_LIMIT {
             continue;
         }
         // An experiment lists its corrected variance after that of first order.
@@ -254,13 +263,17 @@ pub fn product_figure(cases: &[&Case]) -> Figure {
         points.sort_by(|a, b| a.x.total_cmp(&b.x));
         Series { name: name.to_owned(), line: Line::Marks, points }
     });
-    let rule = reference("the product", &[(LEAST_PRODUCT, LEAST_PRODUCT), (0.5, 0.5)]);
+    let rule = Series::through(
+        "the product",
+        Line::Reference,
+        [LEAST_PRODUCT, LARGEST_PRODUCT].map(|share| (share, share)),
+    );
     Figure {
         id: "figure-product".to_owned(),
         title: "What first order leaves out of DCCE".to_owned(),
         caption:
             "A noisy gradient times noisy flow: empirical variance over (39c) and (47c), at σ_d/d up to \
-                  .02, against the product's share that (39c+) and (47c+) add. It reaches 2σ²_v/(1 + |v|²) \
+                  0.02, against the product's share that (39c+) and (47c+) add. It reaches 2σ²_v/(1 + |v|²) \
                   in the differential form and does not vanish with σ_d, because all of (39c) that matters \
                   on a flat surface is proportional to σ²_d too."
                 .to_owned(),
@@ -276,13 +289,8 @@ pub fn product_figure(cases: &[&Case]) -> Figure {
     }
 }
 
-fn reference(name: &str, points: &[(f64, f64)]) -> Series {
-    let points = points.iter().map(|&(x, y)| Point { x, y, standard_error: None }).collect();
-    Series { name: name.to_owned(), line: Line::Reference, points }
-}
-
-fn marks(name: &str, cases: &[&Case], place: impl Fn(&Case) -> (f64, f64)) -> Option<Series> {
-    let point = |case: &&Case| {
+fn marks(name: &str, cases: &[&VarianceCase], place: impl Fn(&VarianceCase) -> (f64, f64)) -> Option<Series> {
+    let point = |case: &&VarianceCase| {
         let (x, y) = place(case);
         Point { x, y, standard_error: Some(case.standard_error / case.predicted) }
     };

@@ -1,24 +1,24 @@
-//! Errors of pixels in units of their own σ, counted by σ.
+//! Coverage of pixels' intervals, counted by σ.
 
 use serde::{Deserialize, Serialize};
 
 use egomotion::motion::impact::Z95;
 
-/// Bins of σ for each factor of two.
+/// Bins of σ for each factor of two. More bins divide answers more finely by σ and make records longer.
 const BINS_PER_OCTAVE: f64 = 4.0;
-/// More standard deviations are what a Gaussian never shows.
-const FAR: f64 = 3.0;
+/// Half the width of the wider interval, in standard deviations: a Gaussian leaves it in 0.27 % of all answers.
+const WIDE_INTERVAL_SIGMAS: f64 = 3.0;
 
 /// Numbers of answers, of those within 95 % and of those within 3 σ, by σ.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct BySigma {
+pub struct CoverageBySigma {
     /// (⌊4 log₂ σ⌋, counts), the smallest σ first.
-    bins: Vec<(i32, Counts)>,
+    bins: Vec<(i32, CoverageCounts)>,
 }
 
 /// Answers of about the same σ.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct Counts {
+pub struct CoverageCounts {
     /// All answers.
     pub answers: usize,
     /// Those whose 95 % interval holds the truth.
@@ -27,7 +27,7 @@ pub struct Counts {
     pub within3: usize,
 }
 
-impl Counts {
+impl CoverageCounts {
     fn merged(self, other: &Self) -> Self {
         Self {
             answers: self.answers + other.answers,
@@ -37,29 +37,33 @@ impl Counts {
     }
 
     /// Share of the answers whose 95 % interval holds the truth.
-    pub fn coverage95(&self) -> Option<f64> {
+    pub(super) fn coverage95(&self) -> Option<f64> {
         (self.answers > 0).then(|| self.inside95 as f64 / self.answers as f64)
     }
 
-    /// Share of the answers within 3 σ.
-    pub fn share3(&self) -> Option<f64> {
+    /// Share of the answers within 3 σ of the truth.
+    pub(super) fn coverage3(&self) -> Option<f64> {
         (self.answers > 0).then(|| self.within3 as f64 / self.answers as f64)
     }
 }
 
-impl BySigma {
+impl CoverageBySigma {
     /// Count an answer; one without a positive σ does not count.
-    pub fn add(&mut self, error: f64, sigma: f64) {
+    pub(super) fn add(&mut self, error: f64, sigma: f64) {
         if !(error.is_finite() && sigma > 0.0 && sigma.is_finite()) {
             return;
         }
         let bin = (sigma.log2() * BINS_PER_OCTAVE).floor() as i32;
         let off = error.abs() / sigma;
-        let one = Counts { answers: 1, inside95: (off <= Z95).into(), within3: (off <= FAR).into() };
+        let one = CoverageCounts {
+            answers: 1,
+            inside95: (off <= Z95).into(),
+            within3: (off <= WIDE_INTERVAL_SIGMAS).into(),
+        };
         self.put(bin, &one);
     }
 
-    fn put(&mut self, bin: i32, counts: &Counts) {
+    fn put(&mut self, bin: i32, counts: &CoverageCounts) {
         match self.bins.binary_search_by_key(&bin, |b| b.0) {
             Ok(i) => self.bins[i].1 = self.bins[i].1.merged(counts),
             Err(i) => self.bins.insert(i, (bin, *counts)),
@@ -68,19 +72,19 @@ impl BySigma {
 
     /// The counts of both.
     #[must_use]
-    pub fn merged(mut self, other: &Self) -> Self {
+    pub(super) fn merged(mut self, other: &Self) -> Self {
         other.bins.iter().for_each(|(bin, counts)| self.put(*bin, counts));
         self
     }
 
     /// The counts of all σ.
-    pub fn all(&self) -> Counts {
-        self.bins.iter().fold(Counts::default(), |sum, (_, counts)| sum.merged(counts))
+    pub fn all(&self) -> CoverageCounts {
+        self.bins.iter().fold(CoverageCounts::default(), |sum, (_, counts)| sum.merged(counts))
     }
 
     /// Every fifth of the answers by σ, the surest first; a bin belongs to the fifth in which its middle lies.
-    pub fn fifths(&self) -> [Counts; 5] {
-        let mut fifths = [Counts::default(); 5];
+    pub(super) fn fifths(&self) -> [CoverageCounts; 5] {
+        let mut fifths = [CoverageCounts::default(); 5];
         let total = self.all().answers.max(1);
         let mut before = 0;
         for (_, counts) in &self.bins {
@@ -99,7 +103,7 @@ mod tests {
 
     #[test]
     fn answers_fall_into_fifths_by_their_sigma() {
-        let mut counted = BySigma::default();
+        let mut counted = CoverageBySigma::default();
         for fifth in 0..5 {
             for i in 0..100 {
                 // Beyond 95 % for one in ten, beyond 3 σ for one in twenty, in the last fifth alone.

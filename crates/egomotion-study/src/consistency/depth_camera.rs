@@ -1,4 +1,4 @@
-//! A depth camera that errs as its tolerance says, and what the pipeline makes of its frames.
+//! A depth camera that errs as its tolerance says, and the pipeline's answer to its frames.
 
 use nalgebra::Vector3;
 use rand::SeedableRng;
@@ -6,6 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use serde::{Deserialize, Serialize};
 
+use crate::synthetic::EDGE_RAYS;
 use egomotion::estimate::Tolerance;
 use egomotion::estimate::sensor::tolerance::ACCELERATION;
 use egomotion::geometry::{Field, Grid, Image, RigidMotion, StereoRig, Twist};
@@ -13,12 +14,14 @@ use egomotion::pipeline::PipelineError;
 use egomotion::pipeline::{Config, DepthCamera, DepthNoise, FrameMotion, Observe, RgbdMotion};
 use egomotion::sim::{DepthSensing, Scene, SensorNoise, View};
 
-/// Time between the frames of a pair, in seconds.
+/// Time between the frames of a pair, in seconds: that of a camera with 30 frames a second.
 const INTERVAL_S: f64 = 1.0 / 30.0;
-/// Rays through a pixel at an edge between surfaces, in each direction.
-const RAYS: usize = 3;
-/// Bands of rows that are taken at one moment each.
-const BANDS: usize = 16;
+/// Bands of rows of which an image with a rolling shutter is made, each rendered at one time.
+///
+/// More bands come nearer to a shutter that reads row by row, and take longer to render.
+const SHUTTER_BANDS: usize = 16;
+/// Turns a pair's seed into that of its camera's errors, so that these differ from its pose and texture.
+const ERROR_SEED_MASK: u64 = 0x5eed_dee9;
 
 /// Kinds of depth cameras.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -34,7 +37,7 @@ pub enum DepthKind {
 
 impl DepthKind {
     /// The noise that the pipeline is told.
-    pub fn noise(self) -> DepthNoise {
+    fn noise(self) -> DepthNoise {
         match self {
             Self::Kinect => DepthNoise::kinect(),
             Self::TimeOfFlight => DepthNoise::time_of_flight(),
@@ -51,8 +54,8 @@ impl DepthKind {
     }
 }
 
-/// A depth camera with errors of its own.
-pub(super) struct Camera<'a> {
+/// A depth camera with errors of its own: drawn once, the same for all its frames.
+pub(super) struct ErringDepthCamera<'a> {
     kind: DepthKind,
     scene: &'a Scene,
     rig: &'a StereoRig,
@@ -66,11 +69,11 @@ pub(super) struct Camera<'a> {
     acceleration: Twist,
 }
 
-impl<'a> Camera<'a> {
+impl<'a> ErringDepthCamera<'a> {
     /// The camera of a pair; its errors follow from the seed.
     pub(super) fn new(kind: DepthKind, scene: &'a Scene, rig: &'a StereoRig, seed: u64) -> Self {
         let tolerance = kind.noise().tolerance();
-        let mut rng = Pcg64Mcg::seed_from_u64(seed ^ 0x5eed_dee9);
+        let mut rng = Pcg64Mcg::seed_from_u64(seed ^ ERROR_SEED_MASK);
         let mut any = |sigma: f64| {
             let unit: f64 = StandardNormal.sample(&mut rng);
             sigma * unit
@@ -123,7 +126,7 @@ impl<'a> Camera<'a> {
     /// The image, read row by row.
     fn image(&self, path: &Path, k: usize) -> Image {
         let (width, height) = (self.rig.width_px, self.rig.height_px);
-        let bands = if self.rolls() { BANDS.min(height) } else { 1 };
+        let bands = if self.rolls() { SHUTTER_BANDS.min(height) } else { 1 };
         let readout = self.tolerance.readout_s / INTERVAL_S;
         let mut rows: Vec<f32> = Vec::with_capacity(width * height);
         for band in 0..bands {
@@ -131,7 +134,7 @@ impl<'a> Camera<'a> {
             let middle = 0.5 * (top + bottom) as f64 / height as f64 - 0.5;
             let rig = StereoRig { cy_px: self.rig.cy_px - top as f64, height_px: bottom - top, ..*self.rig };
             let pose = path.pose_at(k as f64 + readout * middle);
-            rows.extend_from_slice(View::new(self.scene, &rig, pose).render(RAYS).left.values());
+            rows.extend_from_slice(View::new(self.scene, &rig, pose).render(EDGE_RAYS).left.values());
         }
         let exact = Grid::from_fn(width, height, |u, v| rows.get(v * width + u).copied().unwrap_or(0.0));
         let seen = egomotion::sim::StereoImages { left: exact.clone(), right: exact };
@@ -150,7 +153,7 @@ impl<'a> Camera<'a> {
     }
 }
 
-/// Where the cyclopean camera is: from time 0 to 1 the scene moves by φ, faster in the end.
+/// The path of the cyclopean camera: from time 0 to 1 the scene moves by φ, faster in the end.
 struct Path {
     pose: RigidMotion,
     phi: Twist,

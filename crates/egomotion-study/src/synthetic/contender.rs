@@ -1,8 +1,8 @@
-//! Every method of the paper in both approaches, with each estimator, on one draw.
+//! The estimators of φ under comparison: every method of the paper in both approaches, and maximum likelihood.
 
 use serde::{Deserialize, Serialize};
 
-use super::draw::{Differential, Discrete};
+use super::draw::{DifferentialDraw, DiscreteDraw};
 use egomotion::estimate::alignment::Form;
 use egomotion::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
 use egomotion::estimate::{MotionEstimate, Unsolvable};
@@ -10,30 +10,48 @@ use egomotion::geometry::{StereoRig, Twist};
 use egomotion::pipeline::solve::Solver;
 use egomotion::pipeline::{Approach, Config, EstimatorKind, Method};
 
-/// One way to find φ.
+/// Both approaches, in the order in which studies run them.
+pub(crate) const APPROACHES: [Approach; 2] = [Approach::Differential, Approach::Discrete];
+
+/// Side of the blocks within which the errors of rows count as correlated, in pixels.
+///
+/// Pixels of the synthetic world share only the disparities of the stencils of their differences, which reach one
+/// pixel to each side. Larger blocks leave fewer of them, and so a less certain covariance.
+const STENCIL_BLOCK_PX: f64 = 12.0;
+
+/// One estimator of φ under comparison: an approach, a method, and how its equations are solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Contender {
-    /// Velocities or finite motion.
+    /// Differential (velocities) or discrete (finite motion).
     pub approach: Approach,
-    /// Which equations.
+    /// The method's equations.
     pub method: Method,
-    /// How they are solved; `ml` brings its own.
+    /// How the equations are solved; maximum likelihood has a solver of its own, and ignores this.
     pub estimator: EstimatorKind,
 }
 
 /// Name of an approach, in files.
-pub fn approach_name(approach: Approach) -> &'static str {
+pub(crate) fn approach_name(approach: Approach) -> &'static str {
     match approach {
         Approach::Discrete => "discrete",
         Approach::Differential => "differential",
     }
 }
 
-/// Side of the blocks within which rows are correlated, in pixels.
-const STENCIL_BLOCK_PX: f64 = 12.0;
+/// Name of a method, in files.
+pub(crate) fn method_name(method: Method) -> &'static str {
+    match method {
+        Method::Ml => "ml",
+        Method::Dcce => "dcce",
+        Method::Dv => "dv",
+        Method::Joint => "joint",
+        Method::Rigid => "rigid",
+        Method::Linear22 => "linear22",
+    }
+}
 
 impl Contender {
-    /// All that have a meaning in an approach.
+    /// All contenders of an approach: each method with each estimator that has a meaning for it.
     pub fn all(approach: Approach) -> Vec<Self> {
         use {EstimatorKind as E, Method as M};
         let estimators = [E::Ls, E::Lmeds, E::Irls];
@@ -48,20 +66,12 @@ impl Contender {
         linear.chain([corrected]).chain([Self { approach, method: M::Ml, estimator: E::Irls }]).collect()
     }
 
-    /// Name of the method, in files.
-    pub fn method_name(&self) -> &'static str {
-        match self.method {
-            Method::Ml => "ml",
-            Method::Dcce => "dcce",
-            Method::Dv => "dv",
-            Method::Joint => "joint",
-            Method::Rigid => "rigid",
-            Method::Linear22 => "linear22",
-        }
+    /// Names of approach, method and estimator, in files.
+    pub(crate) fn names(&self) -> [&'static str; 3] {
+        [approach_name(self.approach), method_name(self.method), self.estimator_name()]
     }
 
-    /// Name of the estimator, in files.
-    pub fn estimator_name(&self) -> &'static str {
+    fn estimator_name(&self) -> &'static str {
         match (self.method, self.estimator) {
             (Method::Ml, _) => "ml",
             (_, EstimatorKind::Ls) => "ls",
@@ -71,13 +81,12 @@ impl Contender {
         }
     }
 
-    /// How it is run in the synthetic world.
+    /// The configuration with which it runs in the synthetic world.
     pub fn config(&self, seed: u64) -> Config {
         Config {
             method: self.method,
             approach: self.approach,
             estimator: self.estimator,
-            // Pixels share nothing but the stencils of their differences.
             block_px: STENCIL_BLOCK_PX,
             seed,
             // Points of the synthetic world share no error of a matcher.
@@ -95,7 +104,7 @@ impl Contender {
     /// [`Unsolvable`] when the draw does not determine a motion.
     pub fn differential(
         &self,
-        draw: &Differential<'_>,
+        draw: &DifferentialDraw<'_>,
         rig: &StereoRig,
         start: &Twist,
         config: &Config,
@@ -119,7 +128,7 @@ impl Contender {
     /// [`Unsolvable`] when the draw does not determine a motion.
     pub fn discrete(
         &self,
-        draw: &Discrete<'_>,
+        draw: &DiscreteDraw<'_>,
         rig: &StereoRig,
         start: &Twist,
         config: &Config,
