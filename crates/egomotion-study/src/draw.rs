@@ -10,8 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::range::{COUNTS, OutOfRange, within};
 use super::world::{UsablePixel, When, World};
-use egomotion::geometry::Gaussian;
-use egomotion::geometry::gaussian::rounding_variance;
+use egomotion::geometry::{Gaussian, rounding_variance};
 use egomotion::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 
 /// Standard deviation that an exact measurement is given, in pixels: weights must stay finite.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::world::{UsablePixel, World};
 use crate::{Axis, Cell, Content, Figure, Line, Panel, Point, Series, Table};
-use egomotion::geometry::perspective::image_flow;
+use egomotion::geometry::image_flow;
 use egomotion::metrics::quantile;
 use egomotion::sim::Sequence;
 

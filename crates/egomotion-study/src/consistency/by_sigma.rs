@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use egomotion::motion::impact::Z95;
+use egomotion::geometry::distribution::NORMAL_P975;
 
 /// Bins of σ for each factor of two.
 const BINS_PER_OCTAVE: f64 = 4.0;
@@ -55,7 +55,7 @@ impl BySigma {
         }
         let bin = (sigma.log2() * BINS_PER_OCTAVE).floor() as i32;
         let off = error.abs() / sigma;
-        let one = Counts { answers: 1, inside95: (off <= Z95).into(), within3: (off <= FAR).into() };
+        let one = Counts { answers: 1, inside95: (off <= NORMAL_P975).into(), within3: (off <= FAR).into() };
         self.put(bin, &one);
     }
 

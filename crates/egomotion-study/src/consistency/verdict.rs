@@ -5,10 +5,8 @@ use nalgebra::{Matrix6, Vector6};
 use super::{BySigma, Record, percent};
 use crate::{Cell, Table};
 use egomotion::geometry::Gaussian;
+use egomotion::geometry::distribution::CHI2_6_P99;
 use egomotion::metrics::Nees;
-
-/// 99 % quantile of χ²₆.
-const CHI2_6_99: f64 = 16.812;
 
 /// Columns of the study's file.
 pub(super) const COLUMNS: [(&str, &str); 17] = [
@@ -85,7 +83,7 @@ impl Verdict {
             }
             t2 += error.fixed_rows::<3>(0).norm_squared() / n;
             r2 += error.fixed_rows::<3>(3).norm_squared() / n;
-            beyond += usize::from(estimate.mahalanobis2(&Vector6::zeros()).is_none_or(|d| d > CHI2_6_99));
+            beyond += usize::from(estimate.mahalanobis2(&Vector6::zeros()).is_none_or(|d| d > CHI2_6_P99));
         }
         let sum = |of: fn(&Record) -> &BySigma| {
             records.iter().fold(BySigma::default(), |sum, record| sum.merged(of(record)))

@@ -12,7 +12,7 @@ use super::site::Site;
 use crate::contender::Contender;
 use egomotion::geometry::{StereoRig, Twist};
 use egomotion::pipeline::Approach;
-use egomotion::sim::sequences::{paper_rig, twist_from_mm_deg};
+use egomotion::sim::{paper_rig, twist_from_mm_deg};
 
 /// Noise of the points, in pixels.
 const NOISE_PX: f64 = 0.125;
@@ -120,7 +120,7 @@ impl Degenerate {
                 Approach::Differential => &velocities,
                 Approach::Discrete => &displacements,
             };
-            let Ok(found) = solve(contender).and_then(|found| found.known()) else {
+            let Ok(found) = solve(contender).and_then(|found| found.with_unbounded_unobserved()) else {
                 return Report { draws: 1, ..Report::default() };
             };
             let error = found.theta.mean - truth.vector();

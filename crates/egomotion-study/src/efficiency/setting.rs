@@ -13,11 +13,9 @@ use super::tally::Tally;
 use crate::contender::Contender;
 use crate::draw::{Differential, Discrete};
 use crate::world::World;
-use egomotion::estimate::likelihood::maximum_likelihood::{
-    MaximumLikelihoodOptions, efficient, maximum_likelihood,
+use egomotion::estimate::{
+    MaximumLikelihoodOptions, MotionEstimate, Unsolvable, efficient, maximum_likelihood, robust_start,
 };
-use egomotion::estimate::likelihood::robust_start::robust_start;
-use egomotion::estimate::{MotionEstimate, Unsolvable};
 use egomotion::geometry::{Gaussian, StereoRig, Twist};
 use egomotion::observe::{StereoFlow, StereoTrack};
 use egomotion::pipeline::{Approach, Config, Method};

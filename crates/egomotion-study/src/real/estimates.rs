@@ -35,7 +35,7 @@ pub fn printed_ways(measured: &Measured, step_px: usize, seed: u64) -> Vec<(Way,
         let still = Twist::zero();
         let solver = Solver::new(&measured.rig, &still, &config);
         let mut add = |approach, method, answer: Result<MotionEstimate, Unsolvable>| {
-            let known = answer.and_then(MotionEstimate::known);
+            let known = answer.and_then(MotionEstimate::with_unbounded_unobserved);
             found.extend(known.ok().map(|estimate| (Way::new(approach, method, estimator), estimate)));
         };
         for (i, approach) in [Approach::Differential, Approach::Discrete].into_iter().enumerate() {

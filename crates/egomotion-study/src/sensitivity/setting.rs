@@ -8,11 +8,10 @@ use crate::contender::{Contender, approach_name};
 use crate::draw::{self, Measuring};
 use crate::tally::Tally;
 use crate::world::{UsablePixel, World};
-use egomotion::estimate::MotionEstimate;
-use egomotion::estimate::likelihood::maximum_likelihood::cramer_rao_bound;
+use egomotion::estimate::{MotionEstimate, cramer_rao_bound};
 use egomotion::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
 use egomotion::metrics::quantile;
-use egomotion::motion::depth_velocity::{self, DisparityOffset, RigidPrediction};
+use egomotion::motion::{DisparityOffset, RigidPrediction, depth_velocity};
 use egomotion::pipeline::{Approach, EstimatorKind, Method};
 use egomotion::sim::{Sequence, reference_pose};
 

@@ -3,8 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::world::{When, World};
-use egomotion::geometry::Gaussian;
-use egomotion::geometry::perspective::image_flow;
+use egomotion::geometry::{Gaussian, image_flow};
 use egomotion::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 
 /// Disparity at a pixel and at its four neighbours, in pixels.

@@ -4,8 +4,7 @@ use super::coefficients::Variances;
 use super::exact::{Exact, Noise};
 use crate::world::{When, World};
 use crate::{Content, Figure, Panel};
-use egomotion::geometry::gaussian::rounding_variance;
-use egomotion::geometry::{Field, Grid};
+use egomotion::geometry::{Field, Grid, rounding_variance};
 use egomotion::sim::{Sequence, View, reference_pose};
 
 /// Rays in each direction through a pixel at an edge.

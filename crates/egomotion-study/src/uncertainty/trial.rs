@@ -13,8 +13,8 @@ use super::monte_carlo::{Drawn, Noisy, mixed};
 use super::rounding::rounded_variance;
 use super::{LEVELS, STEPS};
 use crate::world::World;
-use egomotion::geometry::Twist;
-use egomotion::geometry::gaussian::rounding_variance;
+use egomotion::geometry::distribution::NORMAL_P975_MEDIUM;
+use egomotion::geometry::{Twist, rounding_variance};
 use egomotion::sim::{Sequence, View, reference_pose};
 
 /// Standard deviations of a disparity, in pixels; the last ones reach beyond σ_d/d = .02.
@@ -25,8 +25,6 @@ const FLOW_PX: [f64; 5] = [0.0, 1.0 / 16.0, 1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
 const ROUNDING_DRAWS: usize = 5;
 /// Levels that the disparity of a surface spans for its rounding error to be uniform.
 const MANY_LEVELS: f64 = 10.0;
-/// Normal quantile of 95 %.
-const NORMAL_95: f64 = 1.959_964;
 
 /// One predicted variance beside the one found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -86,7 +84,7 @@ impl Case {
 
     /// Its 95 % interval.
     pub fn interval(&self) -> (f64, f64) {
-        let half = NORMAL_95 * self.standard_error / self.predicted;
+        let half = NORMAL_P975_MEDIUM * self.standard_error / self.predicted;
         (self.ratio() - half, self.ratio() + half)
     }
 

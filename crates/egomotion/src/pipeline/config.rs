@@ -4,11 +4,8 @@ use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::estimate::Tolerance;
-use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
-use crate::estimate::linear::lmeds::LmedsOptions;
-use crate::estimate::linear::m_estimator::StudentT;
-use crate::motion::impact::Vehicle;
+use crate::estimate::{LmedsOptions, MaximumLikelihoodOptions, StudentT, Tolerance};
+use crate::motion::Vehicle;
 use crate::observe::disparity::AreaOptions;
 use crate::observe::flow::FlowError;
 use crate::observe::{DisparityOptions, FlowOptions, TrackOptions};

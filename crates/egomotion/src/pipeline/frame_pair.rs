@@ -11,10 +11,9 @@ use super::solve::{Observed, solve};
 use super::stereo::StageTimes;
 use super::track_solver::TrackSolver;
 use super::unanswered::Unanswered;
-use crate::estimate::sensor::tolerance::TrackSource;
-use crate::estimate::{MotionEstimate, Unsolvable};
+use crate::estimate::{MotionEstimate, TrackSource, Unsolvable};
 use crate::geometry::{Grid, StereoRig, Twist};
-use crate::motion::obstacle::{NoObstacle, Obstacle, ObstacleCriteria, nearest};
+use crate::motion::{NoObstacle, Obstacle, ObstacleCriteria, nearest_obstacle};
 use crate::observe::flow::{FlowPair, FlowSpace, Side, rigid_flow};
 use crate::observe::row_disagreement::row_disagreement;
 use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};
@@ -192,7 +191,7 @@ impl FramePair<'_> {
         let motion = timed(&mut stages.estimate_ms, || {
             if by_shape {
                 return solve_with_shape(&pair, tracks, rough.as_ref().ok(), self.config, self.dt_s())?
-                    .known();
+                    .with_unbounded_unobserved();
             }
             let start = rough.unwrap_or_else(|_| Twist::zero());
             solve(&Observed::Dense(pair, tracks), self.rig, &start, self.config, self.dt_s())
@@ -210,7 +209,7 @@ impl FramePair<'_> {
             // Without a motion nobody knows what will cross the window.
             let obstacle = rigid
                 .ok_or(NoObstacle::NothingMeasured)
-                .and_then(|_| nearest(&mut seen, pair.flow.size(), &ObstacleCriteria::DENSE));
+                .and_then(|_| nearest_obstacle(&mut seen, pair.flow.size(), &ObstacleCriteria::DENSE));
             (maps, obstacle, groups.map_or_else(Vec::new, Groups::into_groups))
         });
         PairResult {

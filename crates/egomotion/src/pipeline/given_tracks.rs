@@ -10,9 +10,8 @@ use super::memory::TrackMemory;
 use super::stereo::{FrameMotion, MOST_FAILURES, PipelineError, StageTimes};
 use super::track_solver::TrackSolver;
 use super::unanswered::Unanswered;
-use crate::estimate::median;
-use crate::estimate::sensor::tolerance::TrackSource;
-use crate::geometry::{Gaussian, StereoRig, Twist};
+use crate::estimate::TrackSource;
+use crate::geometry::{Gaussian, StereoRig, Twist, median};
 use crate::observe::StereoTrack;
 
 /// A point of a track: where one frame's two images show it, in pixels.

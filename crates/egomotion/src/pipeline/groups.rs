@@ -9,12 +9,11 @@ use serde::{Deserialize, Serialize};
 use super::config::Config;
 use super::moving::Moving;
 use super::solve::Solver;
-use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
-use crate::estimate::likelihood::robust_start::robust_start;
-use crate::estimate::{Blocks, MotionEstimate, median};
-use crate::geometry::{Cells, Gaussian, PixelBounds, StereoRig, upper_median};
-use crate::motion::TimeToImpact;
-use crate::motion::depth_velocity::{DepthVelocity, RigidPrediction, contradict};
+use crate::estimate::{Blocks, MaximumLikelihoodOptions, MotionEstimate, robust_start};
+use crate::geometry::distribution::{CHI2_1_P50, CHI2_6_P999};
+use crate::geometry::{Cells, Gaussian, PixelBounds, StereoRig, median, upper_median};
+use crate::motion::depth_velocity::contradict;
+use crate::motion::{DepthVelocity, RigidPrediction, TimeToImpact};
 use crate::observe::{DensePair, StereoTrack};
 
 /// Fewest cells of a group: single mismatches are none.
@@ -28,10 +27,8 @@ const LEAST_CONFIRMED: f64 = 0.3;
 const STEP: usize = 2;
 /// Side of the blocks of pixels that count as independent: a group has few of the scene's larger ones.
 const BLOCK_PX: f64 = 24.0;
-/// χ²₆(0.999): motions that differ by less are the same.
-const ALIKE: f64 = 22.46;
-/// Median of χ²₁.
-const MEDIAN_CHI2: f64 = 0.454_94;
+/// Motions are the same whose squared difference, in units of its covariance, is less.
+const ALIKE: f64 = CHI2_6_P999;
 
 /// Something that moves by itself, between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -303,14 +300,14 @@ impl Sampled {
         let options = MaximumLikelihoodOptions { seed: own.seed ^ config.seed, ..*own };
         let start = robust_start(&self.tracks, rig, None, &options).ok()?;
         let mut found = Solver::new(rig, &start, config).likelihood(&self.tracks).ok()?;
-        let layout = Blocks::over(rig, config.block_px);
+        let layout = Blocks::tiling(rig, config.block_px);
         let mut blocks: Vec<usize> =
             self.tracks.iter().map(|track| layout.index(track.before.mean.x, track.before.mean.y)).collect();
         blocks.sort_unstable();
         blocks.dedup();
         let freedom = blocks.len() as f64 - 1.0;
         found.theta.cov *= if freedom > 2.0 { freedom / (freedom - 2.0) } else { f64::INFINITY };
-        found.known().ok()
+        found.with_unbounded_unobserved().ok()
     }
 
     /// Squared scale of the measured VZ about those of the body's motion, in units of their variance; at least 1.
@@ -321,6 +318,6 @@ impl Sampled {
         };
         let mut squares: Vec<f64> = self.velocities.iter().filter_map(square).collect();
         // No square is NaN of nothing.
-        (median(&mut squares) / MEDIAN_CHI2).max(1.0)
+        (median(&mut squares) / CHI2_1_P50).max(1.0)
     }
 }

@@ -7,9 +7,8 @@ use super::config::Config;
 use super::groups::Groups;
 use super::map_row::{MapRow, Scene};
 use crate::geometry::{Cells, Field, Gaussian, Grid, StereoRig};
-use crate::motion::TimeToImpact;
-use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
-use crate::motion::obstacle::{ObstacleCriteria, Sightings};
+use crate::motion::depth_velocity::{self, rigid_unless_moving};
+use crate::motion::{ObstacleCriteria, RigidPrediction, Sightings, TimeToImpact};
 use crate::observe::{DensePair, StereoTrack};
 
 /// Per-pixel results on the pixel grid of the earlier frame; missing pixels are NaN.
@@ -114,7 +113,7 @@ pub fn track_sightings(
     dt_s: f64,
 ) -> Vec<Sightings> {
     let (width, height) = (rig.width_px, rig.height_px);
-    let cells = Cells::over((width, height), ObstacleCriteria::SPARSE.cell_px);
+    let cells = Cells::tiling((width, height), ObstacleCriteria::SPARSE.cell_px);
     let mut seen = vec![Sightings::default(); cells.count()];
     // The conversion takes what is negative to zero.
     let pixel = |c: f64, n: usize| (c.round() as usize).min(n.saturating_sub(1));

@@ -3,16 +3,11 @@
 use super::config::{Approach, Config, EstimatorKind, Method};
 use crate::constrain::{binocular_flow, dcce, image_flow};
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
-use crate::estimate::likelihood::maximum_likelihood::{MaximumLikelihood, maximum_likelihood};
-use crate::estimate::linear::errors_in_variables::errors_in_variables;
-use crate::estimate::linear::least_squares::{Weighting, least_squares};
-use crate::estimate::linear::lmeds::{LmedsOptions, lmeds};
-use crate::estimate::linear::m_estimator::m_estimate;
-use crate::estimate::linear::two_step::two_step;
-use crate::estimate::measurement::Measurement;
-use crate::estimate::sensor::augmented::augmented_step;
-use crate::estimate::sensor::tolerance::{SensedTrack, SensorErrors, SensorPrior, TrackSource};
-use crate::estimate::{Blocks, Fit, MotionEstimate, Row, Tolerance, Unsolvable};
+use crate::estimate::{
+    Blocks, LikelihoodTerm, LinearFit, LmedsOptions, MaximumLikelihood, MotionEstimate, Row, SensedTrack,
+    SensorErrors, SensorPrior, Tolerance, TrackSource, Unsolvable, Weighting, augmented_step,
+    errors_in_variables, least_squares, lmeds, m_estimate, maximum_likelihood, two_step,
+};
 use crate::geometry::{StereoRig, Twist};
 use crate::observe::{DensePair, DepthChange, StereoFlow, StereoTrack};
 use nalgebra::Matrix6;
@@ -47,7 +42,7 @@ pub fn solve(
         (Method::Rigid, _) => solver.alignment(&solver.tracks(observed), Form::Rigid),
         (Method::Linear22, _) => solver.alignment(&solver.tracks(observed), Form::Affine),
     };
-    found?.known()
+    found?.with_unbounded_unobserved()
 }
 
 impl Observed<'_> {
@@ -79,13 +74,13 @@ pub struct Solver<'a> {
 impl<'a> Solver<'a> {
     /// Rows get their σ, and iterations their start, at the motion `start`.
     pub fn new(rig: &'a StereoRig, start: &'a Twist, config: &'a Config) -> Self {
-        let exact = Tolerance::default().over(0.0);
-        Self { rig, start, config, blocks: Blocks::over(rig, config.block_px), prior: exact }
+        let exact = Tolerance::default().prior_over(0.0);
+        Self { rig, start, config, blocks: Blocks::tiling(rig, config.block_px), prior: exact }
     }
 
     /// The same for an interval of `dt_s` seconds, with the tolerance of the sensor.
     pub fn over(self, dt_s: f64) -> Self {
-        Self { prior: self.config.tolerance.over(dt_s), ..self }
+        Self { prior: self.config.tolerance.prior_over(dt_s), ..self }
     }
 
     fn tracks(&self, observed: &Observed<'_>) -> Vec<StereoTrack> {
@@ -125,7 +120,7 @@ impl<'a> Solver<'a> {
     }
 
     /// The configured estimator on rows whose scale is as printed.
-    fn fit<const N: usize>(&self, rows: &[Row<N>]) -> Result<Fit<N>, Unsolvable> {
+    fn fit<const N: usize>(&self, rows: &[Row<N>]) -> Result<LinearFit<N>, Unsolvable> {
         match self.config.estimator {
             EstimatorKind::Ls => least_squares(rows, Weighting::Unit),
             EstimatorKind::Lmeds => lmeds(rows, Weighting::Unit, &self.lmeds()),
@@ -145,7 +140,7 @@ impl<'a> Solver<'a> {
     ///
     /// # Errors
     /// [`Unsolvable`] when the observations do not determine a motion.
-    pub fn likelihood<M: Measurement>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
+    pub fn likelihood<M: LikelihoodTerm>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
         let options = &self.config.maximum_likelihood;
         let blocks = Some(&self.blocks);
         let found = maximum_likelihood(observations, self.rig, self.start, blocks, &options.kernel)?;
@@ -158,8 +153,8 @@ impl<'a> Solver<'a> {
     fn phase(&self, found: &MaximumLikelihood) -> Matrix6<f64> {
         let known = found.motion.theta.cov.iter().all(|v| v.is_finite());
         let sigma_px = self.config.maximum_likelihood.phase_error_px;
-        let common = found.common.filter(|_| known);
-        common.map_or_else(Matrix6::zeros, |common| common.phase_covariance(sigma_px))
+        let systematic = found.systematic.filter(|_| known);
+        systematic.map_or_else(Matrix6::zeros, |systematic| systematic.phase_covariance(sigma_px))
     }
 
     /// Maximum likelihood of tracks that a sensor made which is known only so well.

@@ -7,14 +7,12 @@ use super::maps::track_sightings;
 use super::solve::{Observed, solve};
 use super::stereo::StageTimes;
 use super::unanswered::Unanswered;
-use crate::estimate::likelihood::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
-use crate::estimate::likelihood::robust_start::robust_start;
-use crate::estimate::sensor::systematic::common_errors;
-use crate::estimate::sensor::tolerance::TrackSource;
-use crate::estimate::{MotionEstimate, Unsolvable};
+use crate::estimate::{
+    MaximumLikelihoodOptions, MotionEstimate, TrackSource, Unsolvable, maximum_likelihood, robust_start,
+    systematic_response,
+};
 use crate::geometry::{StereoRig, Twist};
-use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
-use crate::motion::obstacle::{NoObstacle, ObstacleCriteria, nearest};
+use crate::motion::{DisparityOffset, NoObstacle, ObstacleCriteria, RigidPrediction, nearest_obstacle};
 use crate::observe::StereoTrack;
 
 /// Standard deviation of an offset of disparity per pixel by which rows disagree.
@@ -66,7 +64,7 @@ impl<'a> TrackSolver<'a> {
         let rigid = self.rigid(tracks, motion.as_ref().ok(), row_disagreement_px);
         let obstacle = rigid.ok_or(NoObstacle::NothingMeasured).and_then(|rigid| {
             let mut seen = track_sightings(tracks, &rigid, self.rig, self.config, self.dt_s);
-            nearest(&mut seen, (self.rig.width_px, self.rig.height_px), &ObstacleCriteria::SPARSE)
+            nearest_obstacle(&mut seen, (self.rig.width_px, self.rig.height_px), &ObstacleCriteria::SPARSE)
         });
         PairResult {
             motion: motion.map_err(Unanswered::from),
@@ -91,10 +89,10 @@ impl<'a> TrackSolver<'a> {
     ) -> Option<RigidPrediction<'a>> {
         let motion = motion?;
         let kernel = &self.config.maximum_likelihood.kernel;
-        let common = common_errors(tracks, self.rig, &motion.phi(), kernel);
-        let offset = common.map_or_else(DisparityOffset::none, |common| DisparityOffset {
+        let systematic = systematic_response(tracks, self.rig, &motion.phi(), kernel);
+        let offset = systematic.map_or_else(DisparityOffset::none, |systematic| DisparityOffset {
             sigma_px: OFFSET_PER_ROW_DISAGREEMENT * row_disagreement_px.unwrap_or(0.0),
-            phi_per_px: common.by_disparity_offset,
+            phi_per_px: systematic.phi_per_offset_px,
         });
         RigidPrediction::new(&motion.theta, offset, self.rig)
     }
