@@ -1,8 +1,7 @@
 //! Motion by alignment of points before and after.
 
-use egomotion::estimate::Unsolvable;
 use egomotion::estimate::alignment::{self, Fitting, Form, PointPair};
-use egomotion::estimate::linear::lmeds::LmedsOptions;
+use egomotion::estimate::{LmedsOptions, Unsolvable};
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -23,7 +22,7 @@ pub fn align<'py>(
     form: &str,
 ) -> PyResult<Motion<'py>> {
     let pairs = pairs(before, after)?;
-    let sums = alignment::Moments::over(pairs.iter().map(|pair| (pair, 1.0)));
+    let sums = alignment::Moments::of_weighted_pairs(pairs.iter().map(|pair| (pair, 1.0)));
     let found = sums.align(self::form(form)?).ok_or_else(|| unsolvable(Unsolvable::Unobservable))?;
     Ok((arrays::square(py, &found.linear)?, PyArray1::from_slice(py, found.translation.as_slice())))
 }

@@ -48,7 +48,7 @@ fn words<const N: usize>(directions: &[SVector<f64, N>]) -> Vec<String> {
     }
     let motions =
         directions.iter().map(|direction| SVector::<f64, 6>::from_column_slice(direction.as_slice()));
-    let free = estimate::Undetermined::<6>::spanned(motions, 1e-3);
+    let free = estimate::UndeterminedDirections::<6>::spanned(motions, 1e-3);
     free.motions().iter().map(ToString::to_string).collect()
 }
 

@@ -1,10 +1,6 @@
 //! Estimators on rows of equations.
 
-use egomotion::estimate::linear::least_squares::{self as squares, Weighting};
-use egomotion::estimate::linear::lmeds::{self as median, LmedsOptions};
-use egomotion::estimate::linear::m_estimator::{StudentT, m_estimate};
-use egomotion::estimate::linear::two_step as steps;
-use egomotion::estimate::{Fit, Row, Unsolvable};
+use egomotion::estimate::{self, LinearFit, LmedsOptions, Row, StudentT, Unsolvable, Weighting, m_estimate};
 use nalgebra::SVector;
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
@@ -20,7 +16,7 @@ fn weighting(weighted: bool) -> Weighting {
 }
 
 /// What a fit found, with its weights.
-fn fitted<const N: usize>(fit: Result<Fit<N>, Unsolvable>, rows: &[Row<N>]) -> PyResult<Estimate> {
+fn fitted<const N: usize>(fit: Result<LinearFit<N>, Unsolvable>, rows: &[Row<N>]) -> PyResult<Estimate> {
     let fit = fit.map_err(unsolvable)?;
     Ok(Estimate::of(&fit.estimate(rows)).with_weights(fit.weights))
 }
@@ -32,7 +28,7 @@ pub fn least_squares(py: Python<'_>, rows: &Rows, weighted: bool) -> PyResult<Es
     py.detach(|| {
         with_unknowns!(rows, N => {
             let rows = rows.to::<N>();
-            fitted(squares::least_squares(&rows, weighting(weighted)), &rows)
+            fitted(estimate::least_squares(&rows, weighting(weighted)), &rows)
         })
     })
 }
@@ -50,7 +46,7 @@ pub fn irls(py: Python<'_>, rows: &Rows, start: Option<Vec<f64>>, nu: Option<f64
             let rows = rows.to::<N>();
             let start = match &start {
                 Some(start) => SVector::<f64, N>::from_column_slice(start),
-                None => squares::least_squares(&rows, Weighting::InverseVariance).map_err(unsolvable)?.theta,
+                None => estimate::least_squares(&rows, Weighting::InverseVariance).map_err(unsolvable)?.theta,
             };
             fitted(m_estimate(&rows, &start, &kernel), &rows)
         })
@@ -108,7 +104,7 @@ pub fn lmeds(
     py.detach(|| {
         with_unknowns!(rows, N => {
             let rows = rows.to::<N>();
-            fitted(median::lmeds(&rows, weighting(weighted), &options), &rows)
+            fitted(estimate::lmeds(&rows, weighting(weighted), &options), &rows)
         })
     })
 }
@@ -131,7 +127,7 @@ pub fn lmeds_search<'py>(
     let found = py.detach(|| {
         with_unknowns!(rows, N => {
             let subsets = subsets.iter().map(|subset| std::array::from_fn::<usize, N, _>(|i| subset[i]));
-            median::search(&rows.to::<N>(), Weighting::Unit, subsets)
+            estimate::best_subset(&rows.to::<N>(), Weighting::Unit, subsets)
                 .map(|found| (found.theta.as_slice().to_vec(), found.median_square))
         })
     });
@@ -144,7 +140,7 @@ pub fn lmeds_search<'py>(
 pub fn lmeds_trials(confidence: f64, outliers: f64, p: u32) -> PyResult<usize> {
     let possible = (0.0..1.0).contains(&confidence) && (0.0..1.0).contains(&outliers);
     if possible {
-        Ok(median::trials(confidence, outliers, p))
+        Ok(estimate::subsets_needed(confidence, outliers, p))
     } else {
         Err(PyValueError::new_err("confidence and outliers must lie in 0 … 1, without 1"))
     }
@@ -153,7 +149,7 @@ pub fn lmeds_trials(confidence: f64, outliers: f64, p: u32) -> PyResult<usize> {
 /// The robust standard deviation from the median square of n residuals with p unknowns.
 #[pyfunction]
 pub fn robust_scale(median_square: f64, n: usize, p: usize) -> f64 {
-    median::robust_scale(median_square, n, p)
+    estimate::robust_scale(median_square, n, p)
 }
 
 /// φ by binocular flow in the paper's two steps, (14) then (3): `estimator` "ls", or "lmeds" with defaults.
@@ -174,11 +170,11 @@ pub fn two_step(py: Python<'_>, dv: &Rows, flow: &Rows, estimator: &str) -> PyRe
     };
     let solve = |rows: &[Row<3>]| {
         if robust {
-            median::lmeds(rows, Weighting::Unit, &LmedsOptions::default())
+            estimate::lmeds(rows, Weighting::Unit, &LmedsOptions::default())
         } else {
-            squares::least_squares(rows, Weighting::Unit)
+            estimate::least_squares(rows, Weighting::Unit)
         }
     };
-    let found = py.detach(|| steps::two_step(&dv.to(), &flow.to(), solve));
+    let found = py.detach(|| estimate::two_step(&dv.to(), &flow.to(), solve));
     Ok(Estimate::of(&found.map_err(unsolvable)?))
 }

@@ -1,6 +1,6 @@
 //! Twists φ and rigid motions, as vectors and matrices.
 
-use egomotion::geometry::{RigidMotion, Twist, perspective};
+use egomotion::geometry::{RigidMotion, Twist};
 use nalgebra::Matrix3;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::PyValueError;
@@ -114,5 +114,5 @@ pub fn image_flow<'py>(
     focal: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (phi, xyz) = (twist("phi", phi)?, arrays::rows::<3>("xyz", xyz)?);
-    arrays::table(py, xyz.iter().map(|p| perspective::image_flow(&phi, p.x, p.y, p.z, focal)))
+    arrays::table(py, xyz.iter().map(|p| egomotion::geometry::image_flow(&phi, p.x, p.y, p.z, focal)))
 }

@@ -1,9 +1,6 @@
 //! Estimators on what was measured: maximum likelihood with its bound, and errors in variables.
 
-use egomotion::estimate::likelihood::maximum_likelihood as likelihood;
-use egomotion::estimate::linear::errors_in_variables as variables;
-use egomotion::estimate::linear::m_estimator::StudentT;
-use egomotion::estimate::{Blocks, Unsolvable};
+use egomotion::estimate::{self, Blocks, StudentT, Unsolvable};
 use egomotion::geometry::Twist;
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -40,9 +37,9 @@ pub fn maximum_likelihood(
         ..default
     };
     let start = start.map_or_else(|| Ok(Twist::zero()), |start| twist("start", start))?;
-    let blocks = block_px.map(|size| Blocks::over(&rig.0, size));
+    let blocks = block_px.map(|size| Blocks::tiling(&rig.0, size));
     let found =
-        py.detach(|| likelihood::maximum_likelihood(&tracks.0, &rig.0, &start, blocks.as_ref(), &kernel));
+        py.detach(|| estimate::maximum_likelihood(&tracks.0, &rig.0, &start, blocks.as_ref(), &kernel));
     let found = found.map_err(unsolvable)?;
     Ok((Estimate::of(&found.motion), found.cost))
 }
@@ -56,7 +53,7 @@ pub fn cramer_rao_bound<'py>(
     phi: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let phi = twist("phi", phi)?;
-    let bound = likelihood::cramer_rao_bound(&tracks.0, &rig.0, &phi);
+    let bound = estimate::cramer_rao_bound(&tracks.0, &rig.0, &phi);
     arrays::square(py, &bound.ok_or_else(|| unsolvable(Unsolvable::Unobservable))?)
 }
 
@@ -71,7 +68,7 @@ pub fn errors_in_variables(
     block_px: f64,
 ) -> PyResult<Estimate> {
     let start = start.map_or_else(|| Ok(Twist::zero()), |start| twist("start", start))?;
-    let blocks = Blocks::over(&rig.0, block_px);
-    let found = py.detach(|| variables::errors_in_variables(&changes.0, &rig.0, &start, &blocks));
+    let blocks = Blocks::tiling(&rig.0, block_px);
+    let found = py.detach(|| estimate::errors_in_variables(&changes.0, &rig.0, &start, &blocks));
     Ok(Estimate::of(&found.map_err(unsolvable)?))
 }

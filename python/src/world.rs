@@ -2,7 +2,6 @@
 
 use egomotion::geometry::RigidMotion;
 use egomotion::sim;
-use egomotion::sim::truth_maps;
 use numpy::{PyArray1, PyArray2, PyArray3};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
@@ -110,13 +109,13 @@ impl Sequence {
         let dict = PyDict::new(py);
         dict.set_item("disparity", arrays::field_plane(py, &maps.shift)?)?;
         dict.set_item("depth", arrays::field_plane(py, &maps.depth)?)?;
-        dict.set_item("in_right", seen(truth_maps::IN_RIGHT)?)?;
+        dict.set_item("in_right", seen(sim::IN_RIGHT)?)?;
         if motion.is_some() {
             let flow: Bound<'py, PyArray3<f32>> =
                 arrays::planes(py, &[maps.flow[0].grid(), maps.flow[1].grid()])?;
             dict.set_item("depth_velocity", arrays::field_plane(py, &maps.depth_velocity)?)?;
             dict.set_item("flow", flow)?;
-            dict.set_item("in_later", seen(truth_maps::IN_LATER)?)?;
+            dict.set_item("in_later", seen(sim::IN_LATER)?)?;
         }
         Ok(dict)
     }

@@ -6,12 +6,11 @@
 mod street;
 
 use criterion::Criterion;
-use egomotion::estimate::Row;
-use egomotion::estimate::linear::least_squares::Weighting;
-use egomotion::estimate::linear::lmeds::{LmedsOptions, lmeds, plain_search, random_subsets, search, trials};
-use egomotion::estimate::sensor::systematic::common_errors;
-use egomotion::estimate::sensor::tolerance::TrackSource;
-use egomotion::motion::depth_velocity::{DisparityOffset, RigidPrediction};
+use egomotion::estimate::{
+    LmedsOptions, Row, TrackSource, Weighting, best_subset, best_subset_plain, lmeds, random_subsets,
+    subsets_needed, systematic_response,
+};
+use egomotion::motion::{DisparityOffset, RigidPrediction};
 use egomotion::observe::tracks::{Hints, stereo_tracks};
 use egomotion::observe::{DensePair, DisparityMatcher, StereoPyramid, dense_flow};
 use egomotion::pipeline::plan::Interval;
@@ -44,11 +43,11 @@ fn estimation(c: &mut Criterion) {
     });
     let motion = solve(&Observed::Fields(pair, &tracks), &interval, Some(&start)).unwrap();
     let kernel = &config.maximum_likelihood.kernel;
-    c.bench_function("common errors of tracks", |b| {
-        b.iter(|| common_errors(&tracks, &rig, &motion.phi(), kernel));
+    c.bench_function("systematic response of tracks", |b| {
+        b.iter(|| systematic_response(&tracks, &rig, &motion.phi(), kernel));
     });
-    let common = common_errors(&tracks, &rig, &motion.phi(), kernel).unwrap();
-    let offset = DisparityOffset { sigma_px: 0.1, phi_per_px: common.by_disparity_offset };
+    let systematic = systematic_response(&tracks, &rig, &motion.phi(), kernel).unwrap();
+    let offset = DisparityOffset { sigma_px: 0.1, phi_per_px: systematic.phi_per_offset_px };
     let rigid = RigidPrediction::new(&motion.theta, offset, &rig).unwrap();
     c.bench_function("maps", |b| b.iter(|| motion_maps(&pair, Some(&rigid), None, &interval)));
 }
@@ -71,12 +70,12 @@ fn least_median(c: &mut Criterion) {
     let options = LmedsOptions::default();
     for outliers in [0.0, 0.4] {
         let rows = random_rows(300_000, outliers);
-        let count = trials(options.confidence, options.outliers, 6);
+        let count = subsets_needed(options.confidence, options.outliers, 6);
         let subsets = || random_subsets::<6>(rows.len(), count, options.seed);
-        let found = search(&rows, Weighting::Unit, subsets());
-        assert_eq!(found, plain_search(&rows, Weighting::Unit, subsets()));
+        let found = best_subset(&rows, Weighting::Unit, subsets());
+        assert_eq!(found, best_subset_plain(&rows, Weighting::Unit, subsets()));
         let name = |what: &str| format!("LMedS, {what}, {:.0} % outliers", 100.0 * outliers);
-        c.bench_function(&name("search"), |b| b.iter(|| search(&rows, Weighting::Unit, subsets())));
+        c.bench_function(&name("search"), |b| b.iter(|| best_subset(&rows, Weighting::Unit, subsets())));
         c.bench_function(&name("search and refit"), |b| b.iter(|| lmeds(&rows, Weighting::Unit, &options)));
     }
 }

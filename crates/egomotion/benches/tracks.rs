@@ -5,8 +5,7 @@
 mod street;
 
 use criterion::Criterion;
-use egomotion::estimate::likelihood::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
-use egomotion::estimate::likelihood::robust_start::robust_start;
+use egomotion::estimate::{MaximumLikelihoodOptions, maximum_likelihood, robust_start};
 use egomotion::observe::StereoPyramid;
 use egomotion::observe::row_disagreement::row_disagreement;
 use egomotion::observe::tracks::{Expected, Hints, TrackOptions, follow, measured, stereo_corners};

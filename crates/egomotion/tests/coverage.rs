@@ -8,16 +8,15 @@ mod scattered;
 
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
 use egomotion::estimate::alignment::{Fitting, Form, PointPair, align};
-use egomotion::estimate::likelihood::maximum_likelihood::maximum_likelihood;
-use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
-use egomotion::estimate::linear::lmeds::{LmedsOptions, lmeds, robust_scale};
-use egomotion::estimate::linear::m_estimator::{StudentT, m_estimate};
-use egomotion::estimate::linear::two_step::two_step;
-use egomotion::estimate::{Blocks, Row, median};
-use egomotion::geometry::{Gaussian, StereoRig, Twist};
+use egomotion::estimate::{
+    Blocks, LmedsOptions, Row, StudentT, Weighting, least_squares, lmeds, m_estimate, maximum_likelihood,
+    robust_scale, two_step,
+};
+use egomotion::geometry::{Gaussian, StereoRig, Twist, median};
 use egomotion::metrics::{Coverage, Nees};
-use egomotion::motion::depth_velocity as vz;
-use egomotion::motion::{DepthVelocity, TimeToImpact};
+use egomotion::motion::{
+    DepthVelocity, DisparityOffset, RigidPrediction, TimeToImpact, depth_velocity as vz,
+};
 use egomotion::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
 use rand::RngExt;
@@ -55,7 +54,7 @@ fn is_hotelling(name: &str, nees: &Nees) {
 }
 
 fn blocks(rig: &StereoRig) -> Blocks {
-    Blocks::over(rig, 32.0)
+    Blocks::tiling(rig, 32.0)
 }
 
 fn disturbed<const N: usize>(exact: &Gaussian<N>, rng: &mut Pcg64Mcg) -> Gaussian<N>
@@ -416,7 +415,7 @@ fn rigid_depth_velocity() {
         let sigma = 0.02;
         let drawn = disturbed(&motion, &mut rng);
         let measured = Vector3::new(xyd.x, xyd.y, xyd.z + sigma * normals::<1>(&mut rng)[0]);
-        let prediction = vz::RigidPrediction::new(&drawn, vz::DisparityOffset::none(), &rig).unwrap();
+        let prediction = RigidPrediction::new(&drawn, DisparityOffset::none(), &rig).unwrap();
         let got = prediction.depth_velocity(&measured, sigma).unwrap().z_vz;
         let p = rig.point(&xyd).unwrap();
         nees.add(&got, &Vector2::new(p.z, truth.exp().apply(&p).z - p.z));

@@ -4,14 +4,13 @@
 
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
 use egomotion::estimate::alignment::{Fitting, Form, Moments, PointPair, align};
-use egomotion::estimate::likelihood::maximum_likelihood::{cramer_rao_bound, maximum_likelihood};
-use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
-use egomotion::estimate::linear::lmeds::{self, LmedsOptions};
-use egomotion::estimate::linear::m_estimator::StudentT;
-use egomotion::estimate::linear::two_step::two_step;
-use egomotion::estimate::{NormalEquations, Row};
-use egomotion::geometry::perspective::{image_flow as flow_of, image_velocity};
-use egomotion::geometry::{Field, Gaussian, Grid, RigidMotion, StereoRig, Twist};
+use egomotion::estimate::{
+    LmedsOptions, NormalEquations, Row, StudentT, Weighting, best_subset, cramer_rao_bound, least_squares,
+    maximum_likelihood, refit_best_subset, robust_scale, subsets_needed, two_step,
+};
+use egomotion::geometry::{
+    Field, Gaussian, Grid, RigidMotion, StereoRig, Twist, image_flow as flow_of, image_velocity,
+};
 use egomotion::motion::depth_velocity as vz;
 use egomotion::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
@@ -323,7 +322,7 @@ fn phi() {
             close(&estimate.theta.mean, &vector::<6>(&case["phi_true_l"]), EXACT);
             close(&cyclopean, &vector::<6>(&case["phi_true_cyc"]), EXACT);
         }
-        let sums = Moments::over(points.pairs.iter().map(|pair| (pair, 1.0)));
+        let sums = Moments::of_weighted_pairs(points.pairs.iter().map(|pair| (pair, 1.0)));
         let affine = sums.align(Form::Affine).unwrap();
         close(&affine.linear, &matrix::<3, 3>(&case["lin22_M"]), REGRESSION);
         close(&affine.translation, &vector::<3>(&case["lin22_T"]), REGRESSION);
@@ -345,7 +344,7 @@ fn phi() {
 #[test]
 fn lmeds_trials() {
     for case in vectors()["lmeds_trials"].as_array().unwrap() {
-        let trials = lmeds::trials(num(&case["P"]), num(&case["eps"]), case["p"].as_u64().unwrap() as u32);
+        let trials = subsets_needed(num(&case["P"]), num(&case["eps"]), case["p"].as_u64().unwrap() as u32);
         assert_eq!(trials as u64, case["m"].as_u64().unwrap(), "{case}");
     }
 }
@@ -365,17 +364,17 @@ fn lmeds_exhaustive() {
         let n = rows.len();
         let subsets =
             (0..n).flat_map(move |i| (i + 1..n).flat_map(move |j| (j + 1..n).map(move |k| [i, j, k])));
-        let found = lmeds::search(&rows, Weighting::Unit, subsets).unwrap();
+        let found = best_subset(&rows, Weighting::Unit, subsets).unwrap();
         close(&found.theta, &vector::<3>(&case["raw"]), REGRESSION);
         near(found.median_square, num(&case["median_r2"]), REGRESSION);
-        near(lmeds::robust_scale(found.median_square, n, 3), num(&case["s0"]), REGRESSION);
+        near(robust_scale(found.median_square, n, 3), num(&case["s0"]), REGRESSION);
         let once = LmedsOptions { reweights: 1, ..LmedsOptions::default() };
-        let fit = lmeds::refit(&rows, Weighting::Unit, &found, &once).unwrap();
+        let fit = refit_best_subset(&rows, Weighting::Unit, &found, &once).unwrap();
         let kept: Vec<bool> = fit.weights.iter().map(|&w| w > 0.0).collect();
         let want: Vec<bool> = case["keep"].as_array().unwrap().iter().map(|v| v.as_bool().unwrap()).collect();
         assert_eq!(kept, want);
         close(&fit.theta, &vector::<3>(&case["phi"]), REGRESSION);
-        let (all, _) = NormalEquations::over(rows.iter().map(|r| (r, 1.0))).solve().unwrap();
+        let (all, _) = NormalEquations::of_weighted_rows(rows.iter().map(|r| (r, 1.0))).solve().unwrap();
         close(&all, &vector::<3>(&case["ls"]), REGRESSION);
     }
 }

@@ -2,8 +2,7 @@
 
 use egomotion::geometry::{RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::{Config, FrameMotion, StereoFrame, StereoMotion};
-use egomotion::sim::sequences::twist_from_mm_deg;
-use egomotion::sim::{Part, Scene, SensorNoise, Sequence, Shape, View};
+use egomotion::sim::{Part, Scene, SensorNoise, Sequence, Shape, View, twist_from_mm_deg};
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;

@@ -3,14 +3,11 @@
 mod scattered;
 
 use egomotion::constrain::{LinearConstraint, binocular_flow, dcce, image_flow};
-use egomotion::estimate::Row;
-use egomotion::estimate::likelihood::maximum_likelihood::maximum_likelihood;
-use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
-use egomotion::estimate::linear::m_estimator::{StudentT, m_estimate};
-use egomotion::estimate::measurement::Measurement;
+use egomotion::estimate::{
+    LikelihoodTerm, Row, StudentT, Weighting, least_squares, m_estimate, maximum_likelihood,
+};
 use egomotion::geometry::{Gaussian, RigidMotion, Twist};
-use egomotion::motion::DepthVelocity;
-use egomotion::motion::depth_velocity::{self as vz, RigidPrediction};
+use egomotion::motion::{DepthVelocity, DisparityOffset, RigidPrediction, depth_velocity as vz};
 use egomotion::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector4, Vector6};
 use rand::RngExt;
@@ -330,7 +327,7 @@ fn covariance_of_the_rigid_prediction() {
             let motion = Twist::from_vector(&m.fixed_rows::<6>(1).into()).exp();
             Vector2::new(p.z, motion.apply(&p).z - p.z)
         };
-        let prediction = RigidPrediction::new(&motion, vz::DisparityOffset::none(), &rig).unwrap();
+        let prediction = RigidPrediction::new(&motion, DisparityOffset::none(), &rig).unwrap();
         let got = prediction.depth_velocity(&xyd, sigma).unwrap().z_vz;
         assert!((got.mean - of(&raw.mean)).norm() < 1e-12);
         let want: Matrix2<f64> = propagated(of, &raw, 1e-3);
@@ -451,7 +448,7 @@ const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, fitted: false, iteratio
 ///
 /// The covariance is that of Gauss–Newton: it differs from the full Hessian by terms of the residuals' order,
 /// which vanish without noise and set the `tolerance` with it.
-fn check_likelihood<M: Measurement>(observations: &[M], cost: impl Fn(&Twist) -> f64, tolerance: f64) {
+fn check_likelihood<M: LikelihoodTerm>(observations: &[M], cost: impl Fn(&Twist) -> f64, tolerance: f64) {
     let found = maximum_likelihood(observations, &rig(), &Twist::zero(), None, &GAUSSIAN).unwrap();
     let theta = &found.motion.theta;
     let at = cost(&found.motion.phi());

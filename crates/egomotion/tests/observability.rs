@@ -3,12 +3,10 @@
 mod scattered;
 
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
-use egomotion::estimate::likelihood::maximum_likelihood::maximum_likelihood;
-use egomotion::estimate::linear::errors_in_variables::errors_in_variables;
-use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
-use egomotion::estimate::linear::m_estimator::StudentT;
-use egomotion::estimate::linear::two_step::two_step;
-use egomotion::estimate::{Blocks, MotionEstimate, Row, Unsolvable};
+use egomotion::estimate::{
+    Blocks, MotionEstimate, Row, StudentT, Unsolvable, Weighting, errors_in_variables, least_squares,
+    maximum_likelihood, two_step,
+};
 use egomotion::geometry::{Gaussian, StereoRig, Twist};
 use egomotion::observe::{DepthChange, DepthFlow};
 use nalgebra::{Matrix3, Vector3};
@@ -141,7 +139,7 @@ fn too_few_points() {
     assert!(matches!(dv_of(&few, &phi(), &rig), Err(Unsolvable::FewRows { .. })));
     let seen: Seen = places(5, &mut rng).into_iter().map(|p| (p, normals::<2>(&mut rng).into())).collect();
     assert_eq!(dcce_of(&seen, &phi(), &rig).err(), Some(Unsolvable::FewRows { rows: 5, needed: 6 }));
-    let none = errors_in_variables(&[], &rig, &phi(), &Blocks::over(&rig, 16.0));
+    let none = errors_in_variables(&[], &rig, &phi(), &Blocks::tiling(&rig, 16.0));
     assert_eq!(none.err(), Some(Unsolvable::FewRows { rows: 0, needed: 6 }));
 }
 
@@ -206,7 +204,7 @@ fn noise_does_not_make_a_plane_tell_more() {
     ] {
         for seed in 0..4 {
             let changes = noisy_changes(&planes, &truth, seed, &rig);
-            let blocks = Blocks::over(&rig, 16.0);
+            let blocks = Blocks::tiling(&rig, 16.0);
             // Least squares thinks that it sees everything.
             let rows: Vec<Row<6>> = changes
                 .iter()

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use egomotion::geometry::upper_median;
-use egomotion::motion::obstacle::ObstacleCriteria;
+use egomotion::motion::ObstacleCriteria;
 use egomotion::pipeline::{Config, StereoFrame, StereoMotion};
 use egomotion::sim::{SensorNoise, Sequence};
 

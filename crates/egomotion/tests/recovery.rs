@@ -5,13 +5,10 @@ mod scattered;
 
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
 use egomotion::estimate::alignment::{Fitting, Form, PointPair, align};
-use egomotion::estimate::likelihood::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
-use egomotion::estimate::likelihood::robust_start::robust_start;
-use egomotion::estimate::linear::least_squares::{Weighting, least_squares};
-use egomotion::estimate::linear::lmeds::{LmedsOptions, lmeds};
-use egomotion::estimate::linear::m_estimator::{StudentT, m_estimate};
-use egomotion::estimate::linear::two_step::two_step;
-use egomotion::estimate::{Blocks, Fit, MotionEstimate, Row, Unsolvable};
+use egomotion::estimate::{
+    Blocks, LinearFit, LmedsOptions, MaximumLikelihoodOptions, MotionEstimate, Row, StudentT, Unsolvable,
+    Weighting, least_squares, lmeds, m_estimate, maximum_likelihood, robust_start, two_step,
+};
 use egomotion::geometry::{Gaussian, StereoRig, Twist};
 use egomotion::observe::{StereoFlow, StereoTrack};
 use nalgebra::{Matrix3, SVector, Vector3, Vector6};
@@ -29,7 +26,7 @@ fn recovers(found: &Vector6<f64>, truth: &Twist) {
 
 /// Depth changes at places with slopes of all directions, as rows of (11).
 fn depth_rows(seen: &[(Vector3<f64>, [f64; 2])], phi: &Twist, rig: &StereoRig) -> Vec<Row<6>> {
-    let blocks = Blocks::over(rig, 32.0);
+    let blocks = Blocks::tiling(rig, 32.0);
     seen.iter()
         .map(|(xyd, slope)| {
             let change =
@@ -51,7 +48,7 @@ fn flows(count: usize, phi: &Twist, rig: &StereoRig, rng: &mut Pcg64Mcg) -> Vec<
 
 /// Rows of (14) and of (3).
 fn flow_rows(flows: &[StereoFlow], rig: &StereoRig) -> (Vec<Row<6>>, Vec<Row<6>>) {
-    let blocks = Blocks::over(rig, 32.0);
+    let blocks = Blocks::tiling(rig, 32.0);
     let block = |flow: &StereoFlow| blocks.index(flow.x_px, flow.y_px);
     let still = Twist::zero();
     let dv =
@@ -66,7 +63,7 @@ fn tracks(count: usize, phi: &Twist, rig: &StereoRig, rng: &mut Pcg64Mcg) -> Vec
 }
 
 fn pairs(tracks: &[StereoTrack], rig: &StereoRig) -> Vec<PointPair> {
-    let blocks = Blocks::over(rig, 32.0);
+    let blocks = Blocks::tiling(rig, 32.0);
     tracks
         .iter()
         .map(|t| PointPair::from_track(t, rig, blocks.index(t.before.mean.x, t.before.mean.y)).unwrap())
@@ -74,7 +71,7 @@ fn pairs(tracks: &[StereoTrack], rig: &StereoRig) -> Vec<PointPair> {
 }
 
 /// The three estimators of linear rows, least squares in both weightings.
-fn linear<const N: usize>(name: &str, rows: &[Row<N>]) -> Result<Fit<N>, Unsolvable> {
+fn linear<const N: usize>(name: &str, rows: &[Row<N>]) -> Result<LinearFit<N>, Unsolvable> {
     match name {
         "ls" => least_squares(rows, Weighting::Unit),
         "wls" => least_squares(rows, Weighting::InverseVariance),
@@ -385,7 +382,7 @@ fn no_information_is_no_answer() {
 #[test]
 fn a_single_block_has_no_scatter_to_judge_by() {
     let (rig, mut rng) = (rig(), random(11));
-    let whole = Blocks::over(&rig, 1000.0);
+    let whole = Blocks::tiling(&rig, 1000.0);
     assert_eq!(whole.count(), 1);
     let tracks = noisy_tracks(100, &phi(), &rig, &mut rng);
     let unknown = |found: &MotionEstimate| found.theta.cov.diagonal().iter().all(|v| v.is_infinite());
@@ -457,7 +454,7 @@ fn noisy_tracks(count: usize, phi: &Twist, rig: &StereoRig, rng: &mut Pcg64Mcg) 
 fn robust(tracks: &[StereoTrack], rig: &StereoRig) -> MotionEstimate {
     let options = MaximumLikelihoodOptions::default();
     let start = robust_start(tracks, rig, None, &options).unwrap();
-    let blocks = Blocks::over(rig, 32.0);
+    let blocks = Blocks::tiling(rig, 32.0);
     maximum_likelihood(tracks, rig, &start, Some(&blocks), &options.kernel).unwrap().motion
 }
 

@@ -2,8 +2,7 @@
 
 use egomotion::metrics::quantile;
 use egomotion::observe::{DisparityMatcher, DisparityOptions, FlowOptions, Pyramid, dense_flow};
-use egomotion::sim::truth_maps::{IN_LATER, IN_RIGHT};
-use egomotion::sim::{SensorNoise, Sequence};
+use egomotion::sim::{IN_LATER, IN_RIGHT, SensorNoise, Sequence};
 
 const LARGEST_MEDIAN_PX: f64 = 0.1;
 

@@ -1,7 +1,6 @@
 //! The synthetic world against what it claims: exact truth, and images that agree with it.
 
-use egomotion::geometry::perspective::image_flow;
-use egomotion::geometry::{Image, Twist};
+use egomotion::geometry::{Image, Twist, image_flow};
 use egomotion::sim::{MotionTruth, PointTruth, Sequence, field_of};
 use nalgebra::Vector3;
 

@@ -3,8 +3,7 @@
 use egomotion::constrain::LinearConstraint;
 use egomotion::estimate::Blocks;
 use egomotion::geometry::{Gaussian, Twist};
-use egomotion::motion::DepthVelocity;
-use egomotion::motion::depth_velocity as vz;
+use egomotion::motion::{DepthVelocity, depth_velocity as vz};
 use nalgebra::SVector;
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
@@ -97,7 +96,7 @@ fn equations<T: Sync>(
     place: impl Fn(&T) -> (f64, f64) + Sync + Send,
     constraints: impl Fn(&T) -> Vec<LinearConstraint> + Sync + Send,
 ) -> Rows {
-    let blocks = block_px.map(|size| Blocks::over(&rig.0, size));
+    let blocks = block_px.map(|size| Blocks::tiling(&rig.0, size));
     let rows = py.detach(|| {
         let rows = all.par_iter().enumerate().with_min_len(1024).flat_map_iter(|(i, one)| {
             let (x, y) = place(one);

@@ -7,8 +7,8 @@ use std::path::Path;
 
 use egomotion::geometry::RigidMotion;
 use egomotion::metrics::{
-    Delta, Drift, KITTI_LENGTHS_M, RelativePoseError, Spread, TrajectoryAlignment, absolute_errors_m, align,
-    kitti_drift, pairs, relative_pose_error, relative_pose_errors,
+    Delta, Drift, ErrorStatistics, KITTI_LENGTHS_M, RelativePoseError, TrajectoryAlignment,
+    absolute_errors_m, align, kitti_drift, pairs, relative_pose_error, relative_pose_errors,
 };
 
 use serde_json::{Value, json};
@@ -58,9 +58,9 @@ pub struct Over {
     /// The distance, as it was named.
     pub name: String,
     /// Of translation, in metres.
-    pub translation_m: Spread,
+    pub translation_m: ErrorStatistics,
     /// Of rotation, in degrees.
-    pub rotation_deg: Spread,
+    pub rotation_deg: ErrorStatistics,
 }
 
 /// All that is said of a trajectory.
@@ -81,7 +81,7 @@ pub struct Evaluation {
     /// The scale of that.
     pub scale: f64,
     /// Errors of position, in metres.
-    pub absolute_m: Option<Spread>,
+    pub absolute_m: Option<ErrorStatistics>,
     /// Whether the stated uncertainty is true, where the estimate is the folder of a run.
     pub stated: Option<Stated>,
     /// What the user should know of the comparison.
@@ -116,7 +116,7 @@ impl Evaluation {
             let errors =
                 relative_pose_errors(&aligned, true_poses, &pairs(*delta, true_poses, &compared.times_s));
             let of = |value: fn(&egomotion::metrics::PoseError) -> f64| {
-                Spread::of(&errors.iter().map(value).collect::<Vec<_>>())
+                ErrorStatistics::of(&errors.iter().map(value).collect::<Vec<_>>())
             };
             let (translation_m, rotation_deg) = (of(|e| e.translation_m)?, of(|e| e.rotation_deg)?);
             Some(Over { name: name.clone(), translation_m, rotation_deg })
@@ -129,14 +129,14 @@ impl Evaluation {
             drift: kitti_drift(&aligned, true_poses, &options.lengths_m),
             alignment,
             scale: laid.scale,
-            absolute_m: Spread::of(&absolute_errors_m(&aligned, true_poses)),
+            absolute_m: ErrorStatistics::of(&absolute_errors_m(&aligned, true_poses)),
             stated: Stated::read(estimate, truth, options)?,
             warnings,
         })
     }
     /// The same as JSON, with the keys of `egomotion evaluate --json`.
     pub fn json(&self) -> Value {
-        let spread = |s: &Spread| {
+        let spread = |s: &ErrorStatistics| {
             json!({ "rmse": s.rmse, "mean": s.mean, "median": s.median, "std": s.std, "min": s.min,
                     "max": s.max, "sse": s.sse })
         };

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use egomotion::geometry::distribution::NORMAL_P975_COARSE;
 use egomotion::geometry::{RigidMotion, Twist};
 use egomotion::metrics::{Coverage, Nees, associate};
 use serde_json::{Value, json};
@@ -51,7 +52,7 @@ impl Stated {
         }
         self.nees.add(&stated, &phi.vector());
         for i in 0..6 {
-            let reach = 1.96 * stated.sigma(i);
+            let reach = NORMAL_P975_COARSE * stated.sigma(i);
             self.components.add(stated.mean[i] - reach, stated.mean[i] + reach, phi.vector()[i]);
         }
     }

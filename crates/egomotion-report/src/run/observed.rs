@@ -39,7 +39,7 @@ pub fn sentence(report: &Report<'_>) -> Option<String> {
     let motions = || report.frames.iter().filter_map(|row| row.motion.as_ref());
     let of = |n: &dyn Fn(&egomotion::estimate::MotionEstimate) -> usize| {
         let mut all: Vec<f64> = motions().map(|motion| n(motion) as f64).collect();
-        egomotion::estimate::median(&mut all)
+        egomotion::geometry::median(&mut all)
     };
     let (rows, kept) = (of(&|m| m.rows), of(&|m| m.inliers));
     (rows > 0.0).then(|| {

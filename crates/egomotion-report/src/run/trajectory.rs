@@ -1,6 +1,7 @@
 //! The path of the camera from above, its height over time, and how sure both are.
 
 use egomotion::geometry::RigidMotion;
+use egomotion::geometry::distribution::CHI2_2_P95;
 use maud::{Markup, html};
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
@@ -17,8 +18,6 @@ const HEIGHTS: (f64, f64) = (250.0, 400.0);
 const ELLIPSES: usize = 10;
 /// Most points of a line.
 const MOST_POINTS: usize = 3000;
-/// 95 % quantile of χ² with two degrees of freedom.
-const CHI2_95: f64 = 5.991_464_547_107_979;
 
 /// Where the camera was, and how sure that is, at every row.
 pub struct Path<'a> {
@@ -211,7 +210,7 @@ fn half_axes(cov: &Matrix2<f64>) -> Option<[(f64, (f64, f64)); 2]> {
     let eigen = cov.symmetric_eigen();
     let axis = |k: usize| {
         let direction = eigen.eigenvectors.column(k);
-        ((CHI2_95 * eigen.eigenvalues[k].max(0.0)).sqrt(), (direction[0], direction[1]))
+        ((CHI2_2_P95 * eigen.eigenvalues[k].max(0.0)).sqrt(), (direction[0], direction[1]))
     };
     let long = usize::from(eigen.eigenvalues[1] > eigen.eigenvalues[0]);
     Some([axis(long), axis(1 - long)])

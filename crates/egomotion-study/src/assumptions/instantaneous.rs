@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::sequences::{PAPER_SEQUENCES, PAPER_STEPS, two_frames};
 use crate::synthetic::{SyntheticWorld, UsablePixel};
 use crate::{Axis, Cell, Content, Figure, Line, Panel, Series, Table};
-use egomotion::geometry::perspective::image_flow;
+use egomotion::geometry::image_flow;
 use egomotion::metrics::quantile;
 
 /// Half the narrow field of view as a share of the focal length: 7° to each side.

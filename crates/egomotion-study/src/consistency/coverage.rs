@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use egomotion::motion::impact::Z95;
+use egomotion::geometry::distribution::NORMAL_P975;
 
 /// Bins of σ for each factor of two. More bins divide answers more finely by σ and make records longer.
 const BINS_PER_OCTAVE: f64 = 4.0;
@@ -57,7 +57,7 @@ impl CoverageBySigma {
         let off = error.abs() / sigma;
         let one = CoverageCounts {
             answers: 1,
-            inside95: (off <= Z95).into(),
+            inside95: (off <= NORMAL_P975).into(),
             within3: (off <= WIDE_INTERVAL_SIGMAS).into(),
         };
         self.put(bin, &one);

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::synthetic::EDGE_RAYS;
 use egomotion::estimate::Tolerance;
-use egomotion::estimate::sensor::tolerance::ACCELERATION;
+use egomotion::estimate::{HAND_ACCELERATION_M_S2, HAND_ACCELERATION_RAD_S2};
 use egomotion::geometry::{Field, Grid, Image, RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::PipelineError;
 use egomotion::pipeline::{Config, DepthCamera, DepthNoise, FrameMotion, Observe, RgbdMotion};
@@ -83,8 +83,8 @@ impl<'a> ErringDepthCamera<'a> {
         let delay = any(delay_s) / INTERVAL_S;
         let per_interval = INTERVAL_S * INTERVAL_S;
         let acceleration = Twist {
-            t: Vector3::from_fn(|_, _| any(ACCELERATION.0 * per_interval)),
-            omega: Vector3::from_fn(|_, _| any(ACCELERATION.1 * per_interval)),
+            t: Vector3::from_fn(|_, _| any(HAND_ACCELERATION_M_S2 * per_interval)),
+            omega: Vector3::from_fn(|_, _| any(HAND_ACCELERATION_RAD_S2 * per_interval)),
         };
         Self { kind, scene, rig, seed, tolerance, calibration, delay, acceleration }
     }

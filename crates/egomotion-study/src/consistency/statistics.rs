@@ -1,13 +1,11 @@
 //! Statistics over pairs: NEES, normalised variances, coverage.
 
+use egomotion::geometry::distribution::CHI2_6_P99;
 use nalgebra::{Matrix6, Vector6};
 
 use super::{ConsistencyRecord, CoverageBySigma};
 use egomotion::geometry::Gaussian;
 use egomotion::metrics::Nees;
-
-/// Quantile of χ² with six degrees of freedom that 99 % of NEES lie below if covariances are true.
-const CHI2_6_99: f64 = 16.812;
 
 impl ConsistencyRecord {
     /// Error of φ and its covariance.
@@ -65,7 +63,7 @@ impl ConsistencyStatistics {
             }
             t2 += error.fixed_rows::<3>(0).norm_squared() / n;
             r2 += error.fixed_rows::<3>(3).norm_squared() / n;
-            beyond += usize::from(estimate.mahalanobis2(&Vector6::zeros()).is_none_or(|d| d > CHI2_6_99));
+            beyond += usize::from(estimate.mahalanobis2(&Vector6::zeros()).is_none_or(|d| d > CHI2_6_P99));
         }
         let sum = |of: fn(&ConsistencyRecord) -> &CoverageBySigma| {
             records.iter().fold(CoverageBySigma::default(), |sum, record| sum.merged(of(record)))

@@ -13,7 +13,7 @@ use super::solver::{ContenderSolver, by_displacements, by_velocities};
 use crate::synthetic::{Contender, draw_seed};
 use egomotion::geometry::{StereoRig, Twist};
 use egomotion::pipeline::Approach;
-use egomotion::sim::sequences::{paper_rig, twist_from_mm_deg};
+use egomotion::sim::{paper_rig, twist_from_mm_deg};
 
 /// Size of the image, width and height in pixels: that of the synthetic world.
 const SIZE_PX: (usize, usize) = (320, 240);
@@ -138,7 +138,7 @@ impl DegenerateScene {
                 Approach::Differential => &velocities,
                 Approach::Discrete => &displacements,
             };
-            let Ok(found) = solve(contender).and_then(|found| found.known()) else {
+            let Ok(found) = solve(contender).and_then(|found| found.with_unbounded_unobserved()) else {
                 return ObservedCounts { draws: 1, ..ObservedCounts::default() };
             };
             let error = found.theta.mean - truth.vector();

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use crate::synthetic::{Contender, DifferentialDraw, DiscreteDraw};
-use egomotion::estimate::likelihood::maximum_likelihood::{MaximumLikelihoodOptions, maximum_likelihood};
-use egomotion::estimate::likelihood::robust_start::robust_start;
+use egomotion::estimate::robust_start;
+use egomotion::estimate::{MaximumLikelihoodOptions, maximum_likelihood};
 use egomotion::estimate::{MotionEstimate, Unsolvable};
 use egomotion::geometry::{Gaussian, StereoRig, Twist};
 use egomotion::observe::{StereoFlow, StereoTrack};

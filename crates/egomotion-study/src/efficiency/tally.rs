@@ -4,14 +4,12 @@
 //! the bound as its covariance. What is known of z need not be drawn: E u² = 1 + E(u² − z²) and E u = E(u − z),
 //! so only the difference from z scatters (a control variate), and few draws tell how near the bound a method is.
 
+use egomotion::geometry::distribution::NORMAL_P975;
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
 use egomotion::estimate::MotionEstimate;
 use egomotion::geometry::{Gaussian, Twist};
-
-/// Half the width of a 95 % interval of the normal distribution, in standard deviations.
-const SIGMAS_95: f64 = 1.959_963_984_540_054;
 
 /// ComponentSums of one component.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -74,7 +72,7 @@ impl EfficiencyTally {
             ComponentSums {
                 shift: u[i] - z[i],
                 excess: [excess, excess * excess],
-                covered: usize::from(own <= SIGMAS_95),
+                covered: usize::from(own <= NORMAL_P975),
                 within_3: usize::from(own <= 3.0),
             }
         };
@@ -144,7 +142,7 @@ mod tests {
         let estimate = |error: f64| Estimate {
             theta: Gaussian { mean: Vector6::from_element(error), cov: Matrix6::identity() },
             observed: [true; 6],
-            undetermined: egomotion::estimate::Undetermined::default(),
+            undetermined: egomotion::estimate::UndeterminedDirections::default(),
             rows: 9,
             inliers: 9,
             residual_scale: 1.0,

@@ -13,7 +13,7 @@ use super::solver::{ContenderSolver, by_displacements, by_velocities};
 use super::tally::EfficiencyTally;
 use crate::synthetic::{APPROACHES, Contender, REFERENCE_POSES, SyntheticWorld, draw_seed};
 use egomotion::estimate::MotionEstimate;
-use egomotion::estimate::likelihood::maximum_likelihood::efficient;
+use egomotion::estimate::efficient;
 use egomotion::geometry::{Gaussian, StereoRig, Twist};
 use egomotion::pipeline::Approach;
 use egomotion::sim::Sequence;

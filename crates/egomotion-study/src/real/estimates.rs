@@ -83,7 +83,7 @@ fn by_printed_methods(
         let still = Twist::zero();
         let solver = Solver::new(&matched.rig, &still, &config);
         let mut add = |approach, method, answer: Result<MotionEstimate, Unsolvable>| {
-            let known = answer.and_then(MotionEstimate::known);
+            let known = answer.and_then(MotionEstimate::with_unbounded_unobserved);
             found.extend(
                 known.ok().map(|estimate| (ImageContender::new(approach, method, estimator), estimate)),
             );

@@ -9,9 +9,10 @@ use crate::synthetic::{
     Contender, DifferentialDraw, DiscreteDraw, MeasurementModel, SyntheticWorld, UsablePixel, approach_name,
 };
 use egomotion::estimate::MotionEstimate;
-use egomotion::estimate::likelihood::maximum_likelihood::cramer_rao_bound;
+use egomotion::estimate::cramer_rao_bound;
 use egomotion::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
-use egomotion::motion::depth_velocity::{self, DisparityOffset, RigidPrediction};
+use egomotion::motion::depth_velocity;
+use egomotion::motion::{DisparityOffset, RigidPrediction};
 use egomotion::pipeline::{Approach, EstimatorKind, Method};
 
 /// φ by a contender whose rows are weighted at a motion.

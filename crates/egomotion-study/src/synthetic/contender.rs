@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::draw::{DifferentialDraw, DiscreteDraw};
 use egomotion::estimate::alignment::Form;
-use egomotion::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
-use egomotion::estimate::{MotionEstimate, Unsolvable};
+use egomotion::estimate::{MaximumLikelihoodOptions, MotionEstimate, Unsolvable};
 use egomotion::geometry::{StereoRig, Twist};
 use egomotion::pipeline::solve::Solver;
 use egomotion::pipeline::{Approach, Config, EstimatorKind, Method};

@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 use serde::{Deserialize, Serialize};
 
 use crate::range::{COUNTS, OutOfRange, within};
-use egomotion::geometry::gaussian::rounding_variance;
+use egomotion::geometry::rounding_variance;
 
 /// Least number of features that a study takes: fewer determine no motion once the noise is 1/8 px.
 pub const LEAST_FEATURES: usize = 8;

@@ -1,11 +1,9 @@
 //! One case: a predicted variance beside the empirical one.
 
+use egomotion::geometry::distribution::NORMAL_P975_MEDIUM;
 use serde::{Deserialize, Serialize};
 
 use super::formula::{Family, FormulaKind, Inputs};
-
-/// Half the width of a 95 % interval of the normal distribution, in standard deviations, to seven digits.
-const NORMAL_95: f64 = 1.959_964;
 
 /// A predicted variance beside the empirical one, at one place with its noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -65,7 +63,7 @@ impl VarianceCase {
 
     /// Its 95 % interval.
     pub fn interval(&self) -> (f64, f64) {
-        let half = NORMAL_95 * self.standard_error / self.predicted;
+        let half = NORMAL_P975_MEDIUM * self.standard_error / self.predicted;
         (self.ratio() - half, self.ratio() + half)
     }
 

@@ -4,7 +4,7 @@ use super::coefficients::Variances;
 use super::pixel::{ExactPixel, PixelNoise};
 use crate::synthetic::{EDGE_RAYS, FrameTime, SyntheticWorld};
 use crate::{Content, Figure, Panel};
-use egomotion::geometry::gaussian::rounding_variance;
+use egomotion::geometry::rounding_variance;
 use egomotion::geometry::{Field, Grid, Twist};
 use egomotion::pipeline::Approach;
 use egomotion::sim::{Sequence, View, reference_pose};

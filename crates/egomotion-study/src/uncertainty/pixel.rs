@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::synthetic::{FrameTime, SyntheticWorld};
 use egomotion::geometry::Gaussian;
-use egomotion::geometry::perspective::image_flow;
+use egomotion::geometry::image_flow;
 use egomotion::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 
 /// Disparity at a pixel and at its four neighbours, in pixels.

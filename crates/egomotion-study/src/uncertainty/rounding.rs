@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use egomotion::geometry::gaussian::rounding_variance;
+use egomotion::geometry::rounding_variance;
 
 /// Exact variance of d + noise rounded to a multiple of `step`, for Gaussian noise of `sigma`; all in pixels.
 ///

@@ -14,7 +14,7 @@ use super::rounding::rounded_variance;
 use crate::sequences::PAPER_STEPS;
 use crate::synthetic::SyntheticWorld;
 use egomotion::geometry::Twist;
-use egomotion::geometry::gaussian::rounding_variance;
+use egomotion::geometry::rounding_variance;
 use egomotion::sim::{Sequence, View, reference_pose};
 
 /// Standard deviations of a disparity, in pixels; the largest reach beyond σ_d/d = 0.02, where first order ends.

@@ -3,8 +3,7 @@
 use nalgebra::{Vector3, Vector4};
 
 use super::linear::LinearConstraint;
-use crate::geometry::Twist;
-use crate::geometry::perspective::image_flow;
+use crate::geometry::{Twist, image_flow};
 use crate::observe::DepthChange;
 
 /// Equation (11) in metres: (f Zx, f Zy, −(Z + x Zx + y Zy))/Z · V(P) = −Zt.

@@ -5,6 +5,22 @@ use nalgebra::{Vector3, Vector6};
 use crate::geometry::Twist;
 
 /// A direction n, applied to the velocity of the point P, has a known rate: n · V(P) = c ± σ.
+///
+/// A point 1 m to the right and 2 m ahead comes nearer by 0.1 m: that is one row \[nᵀ, (P × n)ᵀ\] φ = c. A motion
+/// straight ahead explains it; so does a turn about Y.
+///
+/// ```
+/// use egomotion::constrain::LinearConstraint;
+/// use egomotion::geometry::Twist;
+/// use nalgebra::{Vector3, Vector6};
+///
+/// let point = Vector3::new(1.0, 0.0, 2.0);
+/// let nearer = LinearConstraint { point, normal: Vector3::z(), rate: -0.1, sigma: 0.01 };
+/// assert_eq!(nearer.row(), Vector6::new(0.0, 0.0, 1.0, 0.0, -1.0, 0.0));
+/// let straight = Twist { t: Vector3::new(0.0, 0.0, -0.1), omega: Vector3::zeros() };
+/// let turn = Twist { t: Vector3::zeros(), omega: Vector3::new(0.0, 0.1, 0.0) };
+/// assert_eq!((nearer.residual(&straight), nearer.residual(&turn)), (0.0, 0.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinearConstraint {
     /// The point P, in metres, left camera.

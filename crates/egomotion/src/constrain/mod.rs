@@ -1,8 +1,13 @@
-//! From observations to motion constraints n · V(P) = c.
+//! From observations to equations: rows n · V(P) = c, or misclosures that maximum likelihood makes small.
 
 pub mod binocular_flow;
 pub mod dcce;
 pub mod image_flow;
-pub mod linear;
+mod linear;
+mod misclosure;
 
 pub use linear::LinearConstraint;
+#[cfg(test)]
+pub(crate) use misclosure::phase_wave;
+pub(crate) use misclosure::predict;
+pub use misclosure::{LinearisationPoint, Measurement, Misclosure};

@@ -1,13 +1,28 @@
 //! The discrete motion P′ = R P + T from point pairs, equation (22): unconstrained, and with R a rotation.
 
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-use crate::estimate::certainty::blocks;
-use crate::estimate::linear::lmeds::{LmedsOptions, robust_scale, trials};
-use crate::estimate::linear::m_estimator::{LEAST_SCALE2, StudentT};
-use crate::estimate::{Estimate, MotionEstimate, Undetermined, Unsolvable, median};
-use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
+use super::certainty::covariance::jackknife;
+use super::certainty::undetermined::UndeterminedDirections;
+use super::linear::lmeds::{LmedsOptions, robust_scale};
+use super::motion_estimate::{Estimate, MotionEstimate};
+use super::random_subsets::{random_subsets, subsets_needed};
+use super::student_t::{LEAST_SCALE2, StudentT};
+use super::unsolvable::Unsolvable;
+use crate::geometry::distribution::CHI2_3_P50;
+use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist, median};
 use crate::observe::StereoTrack;
+
+/// The spread of points counts as zero along a direction below this share of their largest one, or of their squared
+/// distance from the camera, whose rounding errors it then is.
+const SPREAD_TOLERANCE: f64 = 1e-12;
+/// A pair is an inlier of least median of squares with more than this share of the largest weight.
+const INLIER_WEIGHT_SHARE: f64 = 0.1;
+/// A pair is an inlier of Student's t with more than this robust weight; a residual of zero has 1.75 where ν is 4.
+const INLIER_STUDENT_WEIGHT: f64 = 0.25;
+/// Least squared distance, in m², that makes an outlier: residuals of an exact fit are rounding errors, and a scale of
+/// zero must not reject them all.
+const LEAST_CUT2_M2: f64 = 1e-24;
 
 /// One point before and after the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,7 +112,7 @@ pub struct Moments {
 
 impl Moments {
     /// Sums over weighted pairs.
-    pub fn over<'a>(pairs: impl IntoIterator<Item = (&'a PointPair, f64)>) -> Self {
+    pub fn of_weighted_pairs<'a>(pairs: impl IntoIterator<Item = (&'a PointPair, f64)>) -> Self {
         let mut sums = Self::default();
         for (pair, w) in pairs {
             sums.weight += w;
@@ -129,12 +144,12 @@ impl Moments {
         let cross = self.cross / self.weight - q * p.transpose();
         // Collinear points leave a rotation undetermined, coplanar ones a matrix; equal ones leave rounding
         // errors of the squared distance from the camera.
-        let rounding = 1e-12 * self.spread.trace() / self.weight;
+        let rounding = SPREAD_TOLERANCE * self.spread.trace() / self.weight;
         let eigen = spread.symmetric_eigenvalues();
         let (smallest, largest) = (eigen.min(), eigen.max());
         let middle = eigen.sum() - smallest - largest;
         let needed = if form == Form::Affine { smallest } else { middle };
-        if needed.is_nan() || needed <= rounding.max(1e-12 * largest) {
+        if needed.is_nan() || needed <= rounding.max(SPREAD_TOLERANCE * largest) {
             return None;
         }
         let linear = match form {
@@ -176,7 +191,7 @@ pub fn align(pairs: &[PointPair], form: Form, fitting: &Fitting) -> Result<Motio
             (weights, Some(scale), stretch(form, &slope))
         }
     };
-    let whole = Moments::over(pairs.iter().zip(weights.iter().copied()));
+    let whole = Moments::of_weighted_pairs(pairs.iter().zip(weights.iter().copied()));
     let alignment = whole.align(form).ok_or(Unsolvable::Unobservable)?;
     let phi = |a: &Alignment| a.motion().map(|m| m.log().vector());
     let mean = phi(&alignment).ok_or(Unsolvable::NotFinite)?;
@@ -184,15 +199,15 @@ pub fn align(pairs: &[PointPair], form: Form, fitting: &Fitting) -> Result<Motio
         let freedom = (3 * pairs.len()).saturating_sub(3 * subset).max(1) as f64;
         (pairs.iter().map(|pair| alignment.square(pair)).sum::<f64>() / freedom).sqrt()
     };
-    let cut = 0.1 * weights.iter().copied().fold(0.0, f64::max);
+    let cut = INLIER_WEIGHT_SHARE * weights.iter().copied().fold(0.0, f64::max);
     Ok(Estimate {
-        theta: Gaussian { mean, cov: leave_one_out(pairs, &weights, form, &whole, &stretch) },
+        theta: Gaussian { mean, cov: leave_one_out(pairs, &weights, form, &whole, &alignment, &stretch) },
         observed: [true; 6],
-        undetermined: Undetermined::default(),
+        undetermined: UndeterminedDirections::default(),
         rows: pairs.len(),
         inliers: match fitting {
             Fitting::MEstimator(_) => {
-                pairs.iter().zip(&weights).filter(|(p, w)| **w * p.variance > 0.25).count()
+                pairs.iter().zip(&weights).filter(|(p, w)| **w * p.variance > INLIER_STUDENT_WEIGHT).count()
             }
             _ => weights.iter().filter(|&&w| w > cut).count(),
         },
@@ -200,45 +215,48 @@ pub fn align(pairs: &[PointPair], form: Form, fitting: &Fitting) -> Result<Motio
     })
 }
 
+/// The jackknife over blocks: the estimate without each of them, away from `alignment` by `stretch`.
 fn leave_one_out(
     pairs: &[PointPair],
     weights: &[f64],
     form: Form,
     whole: &Moments,
+    alignment: &Alignment,
     stretch: &Matrix3<f64>,
-) -> nalgebra::Matrix6<f64> {
+) -> Matrix6<f64> {
+    debug_assert_eq!(pairs.len(), weights.len());
     let count = pairs.iter().map(|pair| pair.block + 1).max().unwrap_or(0);
     let mut members: Vec<Vec<(&PointPair, f64)>> = vec![Vec::new(); count];
     for (pair, &weight) in pairs.iter().zip(weights) {
         members[pair.block].push((pair, weight));
     }
-    let Some(all) = whole.align(form) else { return blocks::jackknife(&[]) };
     let left_out: Option<Vec<Vector6<f64>>> = members
         .into_iter()
         .filter(|block| !block.is_empty())
         .map(|block| {
-            let rest = whole.without(&Moments::over(block)).align(form);
-            Some(all.away_to(&rest?, stretch).motion()?.log().vector())
+            let rest = whole.without(&Moments::of_weighted_pairs(block)).align(form);
+            Some(alignment.away_to(&rest?, stretch).motion()?.log().vector())
         })
         .collect();
     // A block without which nothing is determined may be off by anything.
-    blocks::jackknife(&left_out.unwrap_or_default())
+    jackknife(&left_out.unwrap_or_default())
 }
 
+/// Weights of 1 or 0, and the robust scale, by least median of squares.
 fn lmeds_weights(
     pairs: &[PointPair],
     form: Form,
     subset: usize,
     options: &LmedsOptions,
 ) -> Result<(Vec<f64>, f64), Unsolvable> {
-    let count = trials(options.confidence, options.outliers, subset as u32);
+    let count = subsets_needed(options.confidence, options.outliers, subset as u32);
     let mut best: Option<(f64, Alignment)> = None;
     let mut squares = vec![0.0; pairs.len()];
     // Subsets of four serve both forms: a rotation uses the first three.
     if pairs.len() >= 4 {
-        for four in crate::estimate::linear::lmeds::random_subsets::<4>(pairs.len(), count, options.seed) {
+        for four in random_subsets::<4>(pairs.len(), count, options.seed) {
             let chosen = four[..subset].iter().map(|&i| (&pairs[i], 1.0));
-            let Some(alignment) = Moments::over(chosen).align(form) else { continue };
+            let Some(alignment) = Moments::of_weighted_pairs(chosen).align(form) else { continue };
             squares.iter_mut().zip(pairs).for_each(|(s, pair)| *s = alignment.square(pair));
             let middle = median(&mut squares);
             if best.is_none_or(|(m, _)| middle < m) {
@@ -248,7 +266,7 @@ fn lmeds_weights(
     }
     let (middle, mut alignment) = best.ok_or(Unsolvable::Unobservable)?;
     let scale = robust_scale(middle, pairs.len(), subset);
-    let limit = (options.cut * scale).powi(2).max(1e-24);
+    let limit = (options.cut * scale).powi(2).max(LEAST_CUT2_M2);
     let mut weights = Vec::new();
     for _ in 0..options.reweights.max(1) {
         let next: Vec<f64> =
@@ -257,7 +275,7 @@ fn lmeds_weights(
             break;
         }
         weights = next;
-        alignment = Moments::over(pairs.iter().zip(weights.iter().copied()))
+        alignment = Moments::of_weighted_pairs(pairs.iter().zip(weights.iter().copied()))
             .align(form)
             .ok_or(Unsolvable::Unobservable)?;
     }
@@ -269,6 +287,7 @@ fn lmeds_weights(
 /// `slope` is the mean derivative of the robust score by the residual as a share of the mean weight. A matrix
 /// has three regressions of its own, one for each axis; a rotation ties them together.
 fn stretch(form: Form, slope: &Matrix3<f64>) -> Matrix3<f64> {
+    debug_assert!(slope.trace() != 0.0, "without a slope no residual says anything of the motion");
     let mean = Matrix3::identity() * (3.0 / slope.trace());
     match form {
         Form::Affine => slope.try_inverse().unwrap_or(mean),
@@ -282,18 +301,22 @@ fn student_weights(
     form: Form,
     kernel: &StudentT,
 ) -> Result<(Vec<f64>, f64, Matrix3<f64>), Unsolvable> {
+    debug_assert!(
+        pairs.iter().all(|pair| pair.variance > 0.0),
+        "the weight of a pair is its inverse variance"
+    );
     let mut slope = Matrix3::identity();
     let mut weights: Vec<f64> = pairs.iter().map(|pair| pair.variance.recip()).collect();
     let mut squares: Vec<f64> = Vec::with_capacity(pairs.len());
-    // A robust first scale; 2.366 is the median of χ²₃.
+    // A robust first scale.
     let mut scale2 = None;
     for _ in 0..kernel.iterations {
-        let alignment = Moments::over(pairs.iter().zip(weights.iter().copied()))
+        let alignment = Moments::of_weighted_pairs(pairs.iter().zip(weights.iter().copied()))
             .align(form)
             .ok_or(Unsolvable::Unobservable)?;
         squares.clear();
         squares.extend(pairs.iter().map(|pair| alignment.square(pair) / pair.variance));
-        let s2 = scale2.unwrap_or_else(|| median(&mut squares.clone()) / 2.366).max(LEAST_SCALE2);
+        let s2 = scale2.unwrap_or_else(|| median(&mut squares.clone()) / CHI2_3_P50).max(LEAST_SCALE2);
         let robust: Vec<f64> = squares.iter().map(|q| kernel.weight(q / s2, 3.0)).collect();
         let sum: f64 = robust.iter().zip(&squares).map(|(w, q)| w * q).sum();
         slope = mean_slope(pairs, &alignment, &robust, |q| kernel.curvature(q / s2, 3.0) / s2);

@@ -1,188 +1,66 @@
-//! From constraints to φ with its covariance.
+//! From rows or observations to φ with its covariance.
+//!
+//! Linear methods fit rows a · θ = b: [`least_squares`], [`lmeds`], [`m_estimate`] (robust, with Student's t),
+//! [`two_step`] for binocular flow, [`errors_in_variables`] for depth change. [`alignment`] lays points over points.
+//! [`maximum_likelihood`] makes the misclosures of the observations themselves small, and [`cramer_rao_bound`] says what
+//! no estimator surpasses. Every answer is an [`Estimate`], whose covariance comes from [`Blocks`] of neighbouring pixels.
+//!
+//! | symbol | what it is | unit |
+//! |---|---|---|
+//! | P = (X, Y, Z) | a point, in the left camera's frame | m |
+//! | (x, y), d | its image coordinates and its disparity: the *structure* | px |
+//! | φ = (t, Ω) | motion of the scene over one interval, V = t + Ω × P | m, rad |
+//! | R, T | the finite motion exp(φ): P′ = R P + T | –, m |
+//! | δ | a small motion: exp(φ + dφ) = exp(δ) exp(φ) | m, rad |
+//! | n, c | direction and rate of a linear constraint n · V(P) = c | see [`LinearConstraint`](crate::constrain::LinearConstraint) |
+//! | a, b, σ | a row a · θ = b ± σ: a = (n, P × n), b = c | that of c |
+//! | θ | the unknowns of a linear fit: φ, or three of its components | m, rad |
+//! | e, S | misclosure of an observation, and its covariance | px, px² |
+//! | G | −∂e/∂φ, 3×6 | px per m or rad |
+//! | q | eᵀ S⁻¹ e, χ² with three degrees of freedom where noise is as stated | – |
+//! | w | robust weight of an observation, a function of q | – |
+//! | A | information Σ w Gᵀ S⁻¹ G, or Σ w a aᵀ | 1/m², 1/rad² |
+//! | s | score Σ w Gᵀ S⁻¹ e, or Σ w a (b − a · θ), of one block | 1/m, 1/rad |
+//! | B | *bread*: the derivative of the total score, A less what the weights' own change takes away | as A |
+//! | z = B⁻¹ s | influence of a block; Σ z zᵀ is the covariance (the sandwich) | m, rad |
+//! | u | errors of a sensor, in units of their prior standard deviations | – |
+//! | ν | degrees of freedom of Student's t | – |
+//!
+//! A matrix of derivatives is called `…_jacobian`; a single derivative ∂a/∂b is called `a_by_b`.
 
 pub mod alignment;
-mod array;
-pub mod certainty;
-pub mod likelihood;
-pub mod linear;
-pub mod measurement;
-pub mod sensor;
+mod certainty;
+mod likelihood;
+mod linear;
+mod motion_estimate;
+mod random_subsets;
+mod sensor;
+mod serde_array;
+mod student_t;
+mod unsolvable;
 
-use nalgebra::{SMatrix, SVector};
-use serde::{Deserialize, Serialize};
-use thiserror::Error;
-
-use crate::geometry::{Gaussian, Twist};
-
-use certainty::blocks;
 pub use certainty::blocks::Blocks;
 pub use certainty::observability::Observability;
-pub use certainty::undetermined::{FreeMotion, Undetermined};
+pub use certainty::undetermined::{UndeterminedDirections, UndeterminedMotion};
+pub use likelihood::cramer_rao::{cramer_rao_bound, efficient};
+pub use likelihood::maximum_likelihood::{MaximumLikelihood, MaximumLikelihoodOptions, maximum_likelihood};
+pub use likelihood::robust_start::robust_start;
+pub use likelihood::score_sums::LikelihoodTerm;
+pub use likelihood::systematic::{SystematicResponse, systematic_response};
+pub use linear::best_subset::{BestSubset, best_subset, best_subset_plain};
+pub use linear::errors_in_variables::errors_in_variables;
+pub use linear::fit::LinearFit;
+pub use linear::least_squares::{Weighting, least_squares};
+pub use linear::lmeds::{LmedsOptions, lmeds, refit_best_subset, robust_scale};
+pub use linear::m_estimator::m_estimate;
 pub use linear::row::{NormalEquations, Row};
-pub use sensor::tolerance::Tolerance;
-
-/// The answer of an estimator of N unknowns.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Estimate<const N: usize> {
-    /// θ̂ and its covariance; an unobserved component has value 0 and an infinite variance.
-    pub theta: Gaussian<N>,
-    /// Which components are determined by the data.
-    #[serde(with = "array")]
-    pub observed: [bool; N],
-    /// The directions that are not; for φ, what they are in words.
-    pub undetermined: Undetermined<N>,
-    /// Number of rows (or observations) that went in.
-    pub rows: usize,
-    /// Number of rows that the estimator kept as inliers.
-    pub inliers: usize,
-    /// Scale of the residuals: in units of each row's σ where rows are weighted, else in the rows' own unit.
-    pub residual_scale: f64,
-}
-
-/// φ of the left camera with its covariance, order (tX, tY, tZ, ΩX, ΩY, ΩZ), metres and radians per interval.
-pub type MotionEstimate = Estimate<6>;
-
-impl<const N: usize> Estimate<N> {
-    /// Whether every component is determined.
-    pub fn is_complete(&self) -> bool {
-        self.observed.iter().all(|&o| o)
-    }
-}
-
-impl MotionEstimate {
-    /// φ̂.
-    pub fn phi(&self) -> Twist {
-        Twist::from_vector(&self.theta.mean)
-    }
-
-    /// How far φ̂ is from another motion, in standard deviations of the component that is furthest.
-    pub fn moved_from(&self, other: &Twist) -> f64 {
-        let step = self.theta.mean - other.vector();
-        (0..6).map(|i| (step[i] / self.theta.sigma(i)).abs()).fold(0.0, f64::max)
-    }
-
-    /// The estimate with every component unobserved that has no finite variance.
-    ///
-    /// # Errors
-    /// [`Unsolvable::Unobservable`] when none is left.
-    pub fn known(mut self) -> Result<Self, Unsolvable> {
-        for i in 0..6 {
-            if self.observed[i] && !self.theta.cov[(i, i)].is_finite() {
-                self.observed[i] = false;
-                self.undetermined = self.undetermined.with_components([i]);
-            }
-            if !self.observed[i] {
-                self.theta.mean[i] = 0.0;
-            }
-        }
-        let any = self.observed.contains(&true);
-        self.theta.cov = blocks::with_unknowns(self.theta.cov, &self.observed);
-        if any { Ok(self) } else { Err(Unsolvable::Unobservable) }
-    }
-
-    /// The same motion and covariance seen by a parallel camera centred at `centre`, equation (4).
-    pub fn seen_from(&self, centre: &nalgebra::Vector3<f64>) -> Self {
-        let matrix = Twist::seen_from_matrix(centre);
-        let theta = self.theta.propagate(matrix * self.theta.mean, &matrix);
-        Self { theta, undetermined: self.undetermined.transformed(&matrix), ..*self }
-    }
-}
-
-/// Why a system of equations has no answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Error, Serialize, Deserialize)]
-pub enum Unsolvable {
-    /// Fewer equations than unknowns.
-    #[error("{rows} equations for {needed} unknowns")]
-    FewRows {
-        /// Equations at hand.
-        rows: usize,
-        /// Equations needed.
-        needed: usize,
-    },
-    /// No direction of motion is determined.
-    #[error("no direction of motion is observable")]
-    Unobservable,
-    /// A number overflowed or was not a number.
-    #[error("the equations contain numbers that are not finite")]
-    NotFinite,
-    /// The iteration did not settle.
-    #[error("the estimator did not converge")]
-    NotConverged,
-}
-
-/// The median; of an even count the mean of the two middle values. NaN for no values. Reorders `values`.
-pub fn median(values: &mut [f64]) -> f64 {
-    let n = values.len();
-    if n == 0 {
-        return f64::NAN;
-    }
-    let (below, &mut upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
-    if n % 2 == 1 {
-        upper
-    } else {
-        let lower = below.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        0.5 * (lower + upper)
-    }
-}
-
-/// What a linear estimator found: θ̂, the weight it gave each row, and how well θ̂ is determined.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Fit<const N: usize> {
-    /// θ̂.
-    pub theta: SVector<f64, N>,
-    /// The weight of each row in the final normal equations; 0 for a rejected one.
-    pub weights: Vec<f64>,
-    /// Eigen-analysis of the final normal equations.
-    pub observability: Observability,
-    /// Derivative of the total score by θ where it differs from the weighted information.
-    pub bread: Option<SMatrix<f64, N, N>>,
-    /// Number of rows kept as inliers.
-    pub inliers: usize,
-    /// Scale of the residuals, as in [`Estimate::residual_scale`].
-    pub residual_scale: f64,
-}
-
-impl<const N: usize> Fit<N> {
-    /// The estimate with its block-wise covariance; `rows` are those that were fitted.
-    pub fn estimate(&self, rows: &[Row<N>]) -> Estimate<N> {
-        let count = rows.iter().map(|row| row.block + 1).max().unwrap_or(0);
-        let mut scores = vec![blocks::BlockScore::<N>::default(); count];
-        for (row, &weight) in rows.iter().zip(&self.weights) {
-            let block = &mut scores[row.block];
-            block.information += weight * row.a * row.a.transpose();
-            block.score += weight * row.residual(&self.theta) * row.a;
-        }
-        let inverse = self.bread.and_then(|bread| bread.try_inverse());
-        let cov = blocks::covariance(&scores, inverse.as_ref(), &self.observability);
-        Estimate {
-            theta: Gaussian { mean: self.observability.known(&self.theta), cov },
-            observed: self.observability.observed(),
-            undetermined: self.observability.undetermined(),
-            rows: rows.len(),
-            inliers: self.inliers,
-            residual_scale: self.residual_scale,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_has_no_finite_variance_is_not_known() {
-        let estimate = |variances: [f64; 6]| Estimate {
-            theta: Gaussian::independent([1.0; 6], variances),
-            observed: [true; 6],
-            undetermined: Undetermined::default(),
-            rows: 10,
-            inliers: 10,
-            residual_scale: 1.0,
-        };
-        let known = estimate([1.0, f64::INFINITY, 1.0, 1.0, f64::NAN, 1.0]).known().unwrap();
-        assert_eq!(known.observed, [true, false, true, true, false, true]);
-        assert_eq!(known.theta.mean.as_slice(), &[1.0, 0.0, 1.0, 1.0, 0.0, 1.0]);
-        assert_eq!(known.theta.cov[(4, 4)], f64::INFINITY);
-        assert_eq!(estimate([f64::INFINITY; 6]).known(), Err(Unsolvable::Unobservable));
-    }
-}
+pub use linear::two_step::two_step;
+pub use motion_estimate::{Estimate, MotionEstimate};
+pub use random_subsets::{random_subsets, subsets_needed};
+pub(crate) use sensor::augmented::augmented_step;
+pub use sensor::errors::TrackSource;
+pub(crate) use sensor::errors::{SensedTrack, SensorErrors};
+pub(crate) use sensor::tolerance::SensorPrior;
+pub use sensor::tolerance::{HAND_ACCELERATION_M_S2, HAND_ACCELERATION_RAD_S2, Tolerance};
+pub use student_t::StudentT;
+pub use unsolvable::Unsolvable;

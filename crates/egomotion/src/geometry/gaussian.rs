@@ -36,7 +36,7 @@ impl<const N: usize> Gaussian<N> {
     }
 
     /// The same with every correlation dropped: what the paper's printed formulas assume.
-    pub fn without_correlation(&self) -> Self {
+    pub(crate) fn without_correlation(&self) -> Self {
         Self { mean: self.mean, cov: SMatrix::from_diagonal(&self.cov.diagonal()) }
     }
 

@@ -186,7 +186,7 @@ impl Field {
     /// Bilinear value at (u, v), and central differences of such values one pixel each way; `None` outside, or
     /// where one of the pixels they need is missing.
     #[inline(always)]
-    pub fn sample_with_gradient(&self, u: f64, v: f64) -> Option<(f64, (f64, f64))> {
+    pub(crate) fn sample_with_gradient(&self, u: f64, v: f64) -> Option<(f64, (f64, f64))> {
         let (width, height) = self.size();
         let inside = |c: f64, n: usize| c >= 1.0 && c + 1.0 <= n as f64 - 1.0;
         if !(inside(u, width) && inside(v, height)) {

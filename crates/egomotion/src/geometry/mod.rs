@@ -1,21 +1,27 @@
-//! The geometry everything else stands on: cameras, the rig, rigid motion, perspective flow, dense
-//! fields and Gaussians. Imports nothing from the rest of the crate.
+//! Cameras, the stereo rig, rigid motion, dense fields, Gaussians and quantiles: what everything else stands on.
+//!
+//! The module imports nothing from the rest of the crate.
 
-pub mod camera;
-pub mod gaussian;
-pub mod grid;
-pub mod perspective;
-pub mod rectification;
-pub mod regions;
-pub mod rig;
-pub mod twist;
-mod upper_median;
+mod camera;
+mod distortion;
+pub mod distribution;
+pub(crate) mod gaussian;
+mod grid;
+pub(crate) mod order_statistics;
+mod perspective;
+mod rectification;
+mod regions;
+mod rig;
+mod twist;
 
-pub use camera::{Camera, Distortion};
-pub use gaussian::Gaussian;
+pub use camera::{Camera, CameraError};
+pub use distortion::Distortion;
+pub use gaussian::{Gaussian, rounding_variance};
 pub use grid::{Field, Grid, Image};
-pub use rectification::StereoRectification;
-pub use regions::{Cells, PixelBounds};
+pub use order_statistics::{median, upper_median};
+pub use perspective::{image_flow, image_velocity};
+pub use rectification::{RectificationError, StereoRectification};
+pub(crate) use regions::Cells;
+pub use regions::PixelBounds;
 pub use rig::{RigError, StereoRig};
 pub use twist::{RigidMotion, Twist};
-pub use upper_median::upper_median;

@@ -12,6 +12,15 @@ use super::camera::Camera;
 use super::rig::{RigError, StereoRig};
 use super::twist::{RigidMotion, Twist};
 
+/// The rectified focal length is at least this part of the cameras' own. A wide lens would have to be
+/// shown with few pixels in its middle, where most is seen, to show its borders.
+const LEAST_FOCAL_SHARE: f64 = 0.8;
+/// Directions whose tangent with the axis exceeds this, 76°, are never shown: their pixels would be stretched too far.
+const LARGEST_TANGENT: f64 = 4.0;
+/// An entry of the matrix between the cameras may differ from that of the nearest rotation by this much: calibrations
+/// are printed with few digits, and what differs by more is no rotation.
+const LARGEST_ROTATION_ERROR: f64 = 1e-3;
+
 /// A pair of cameras and the rectified rig that their images are turned into.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StereoRectification {
@@ -42,12 +51,6 @@ pub enum RectificationError {
     #[error(transparent)]
     Rig(#[from] RigError),
 }
-
-/// The rectified focal length is at least this part of the cameras' own. A wide lens would have to be
-/// shown with few pixels in its middle, where most is seen, to show its borders.
-const LEAST_RESOLUTION: f64 = 0.8;
-/// Directions further from the axis than this tangent are never shown.
-const WIDEST: f64 = 4.0;
 
 /// A part of the plane of normalised coordinates.
 #[derive(Debug, Clone, Copy)]
@@ -80,7 +83,7 @@ impl StereoRectification {
         let centre = right_from_left.inverse().translation;
         let baseline_m = centre.norm();
         // Written so that NaN is refused too.
-        if !(off < 1e-3 && baseline_m.is_finite() && baseline_m > 0.0) {
+        if !(off < LARGEST_ROTATION_ERROR && baseline_m.is_finite() && baseline_m > 0.0) {
             return Err(RectificationError::Pose);
         }
         let half = Twist { t: Vector3::zeros(), omega: 0.5 * right_from_left.log().omega }.exp().rotation;
@@ -145,12 +148,12 @@ impl StereoRectification {
 
     /// Where the left image shows what the rectified one has at pixel (u, v); `None` where the lens model
     /// ends. The place may lie outside the image.
-    pub fn raw_left(&self, u: f64, v: f64) -> Option<Vector2<f64>> {
+    pub(crate) fn raw_left(&self, u: f64, v: f64) -> Option<Vector2<f64>> {
         self.left.project(&self.turn_left.tr_mul(&self.ray(u, v)))
     }
 
     /// The same for the right image.
-    pub fn raw_right(&self, u: f64, v: f64) -> Option<Vector2<f64>> {
+    pub(crate) fn raw_right(&self, u: f64, v: f64) -> Option<Vector2<f64>> {
         self.right.project(&self.turn_right.tr_mul(&self.ray(u, v)))
     }
 
@@ -172,8 +175,9 @@ impl View {
         };
         let upright = |u: f64| (0..height).filter_map(move |v| Some(direction(u, v as f64)?.x));
         let level = |v: f64| (0..width).filter_map(move |u| Some(direction(u as f64, v)?.y));
-        let x = [upright(0.0).fold(-WIDEST, f64::max), upright(right).fold(WIDEST, f64::min)];
-        let y = [level(0.0).fold(-WIDEST, f64::max), level(bottom).fold(WIDEST, f64::min)];
+        let x =
+            [upright(0.0).fold(-LARGEST_TANGENT, f64::max), upright(right).fold(LARGEST_TANGENT, f64::min)];
+        let y = [level(0.0).fold(-LARGEST_TANGENT, f64::max), level(bottom).fold(LARGEST_TANGENT, f64::min)];
         (x[0] < x[1] && y[0] < y[1]).then_some(Self { x, y })
     }
 
@@ -194,7 +198,7 @@ impl View {
         let span = |[low, high]: [f64; 2], pixels: usize| (pixels.max(1) - 1) as f64 / (high - low);
         let fills = span(self.x, width).max(span(self.y, height));
         let own = cameras.iter().flat_map(|c| [c.focal_px().0, c.focal_px().1]).product::<f64>().powf(0.25);
-        let focal = fills.max(LEAST_RESOLUTION * own);
+        let focal = fills.max(LEAST_FOCAL_SHARE * own);
         // The middle of the raw images in the middle, as far as the view reaches.
         let principal = |[low, high]: [f64; 2], middle: f64, pixels: usize| {
             let half = 0.5 * (pixels.max(1) - 1) as f64;
@@ -208,7 +212,7 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::camera::Distortion;
+    use crate::geometry::Distortion;
 
     /// The drone of EuRoC: two cameras, slightly turned, 0.11 m apart.
     fn drone() -> StereoRectification {

@@ -17,7 +17,7 @@ pub struct PixelBounds {
 
 /// An image divided into square cells, numbered row by row; those at the right and the lower edge may be cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cells {
+pub(crate) struct Cells {
     size_px: usize,
     image: (usize, usize),
     columns: usize,
@@ -25,39 +25,39 @@ pub struct Cells {
 
 impl Cells {
     /// Cells of `size_px` × `size_px` pixels (at least 1) over an image of `(width, height)`.
-    pub fn over(image: (usize, usize), size_px: usize) -> Self {
+    pub(crate) fn tiling(image: (usize, usize), size_px: usize) -> Self {
         let size_px = size_px.max(1);
         Self { size_px, image, columns: image.0.div_ceil(size_px) }
     }
 
     /// Side of a cell, in pixels.
-    pub fn size_px(&self) -> usize {
+    pub(crate) fn size_px(&self) -> usize {
         self.size_px
     }
 
     /// Cells in a row.
-    pub fn columns(&self) -> usize {
+    pub(crate) fn columns(&self) -> usize {
         self.columns
     }
 
     /// Number of cells.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.columns * self.image.1.div_ceil(self.size_px)
     }
 
     /// The cell of a pixel inside the image.
     #[inline(always)]
-    pub fn index(&self, u: usize, v: usize) -> usize {
+    pub(crate) fn index(&self, u: usize, v: usize) -> usize {
         v / self.size_px * self.columns + u / self.size_px
     }
 
     /// First pixel of a cell.
-    pub fn corner(&self, cell: usize) -> (usize, usize) {
+    pub(crate) fn corner(&self, cell: usize) -> (usize, usize) {
         (cell % self.columns * self.size_px, cell / self.columns * self.size_px)
     }
 
     /// The least rectangle around some cells, inside the image; `None` of none.
-    pub fn bounds(&self, cells: &[usize]) -> Option<PixelBounds> {
+    pub(crate) fn bounds(&self, cells: &[usize]) -> Option<PixelBounds> {
         let corners = || cells.iter().map(|&cell| self.corner(cell));
         let (left, right) = (corners().map(|c| c.0).min()?, corners().map(|c| c.0).max()?);
         let (top, bottom) = (corners().map(|c| c.1).min()?, corners().map(|c| c.1).max()?);
@@ -82,7 +82,7 @@ impl Cells {
     }
 
     /// Number of cells of a region that have all four neighbours in it.
-    pub fn enclosed(&self, region: &[usize]) -> usize {
+    pub(crate) fn enclosed(&self, region: &[usize]) -> usize {
         let mut sorted = region.to_vec();
         sorted.sort_unstable();
         let inside = |cell: Option<usize>| cell.is_some_and(|cell| sorted.binary_search(&cell).is_ok());
@@ -91,7 +91,7 @@ impl Cells {
 
     /// The connected regions of the cells that are `member`: neighbours by an edge belong together where they
     /// are `joined`, which must be symmetric. Regions in the order of their first cell.
-    pub fn regions(
+    pub(crate) fn regions(
         &self,
         member: impl Fn(usize) -> bool,
         joined: impl Fn(usize, usize) -> bool,
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn cells_are_joined_over_edges_but_not_corners() {
         // 5 × 3 cells; the last column and row are cut.
-        let cells = Cells::over((18, 11), 4);
+        let cells = Cells::tiling((18, 11), 4);
         assert_eq!((cells.columns(), cells.count()), (5, 15));
         let level = [
             1, 1, 0, 2, 2, //
@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn enclosed_cells_have_four_neighbours() {
-        let cells = Cells::over((20, 16), 4);
+        let cells = Cells::tiling((20, 16), 4);
         // A block of 4 × 3 cells at the left edge, and a row of 5.
         let block: Vec<usize> = (0..3).flat_map(|row| (0..4).map(move |column| 5 * row + column)).collect();
         assert_eq!(cells.enclosed(&block), 2);
@@ -155,6 +155,6 @@ mod tests {
 
     #[test]
     fn an_image_without_pixels_has_no_cells() {
-        assert!(Cells::over((0, 7), 4).regions(|_| true, |_, _| true).is_empty());
+        assert!(Cells::tiling((0, 7), 4).regions(|_| true, |_, _| true).is_empty());
     }
 }

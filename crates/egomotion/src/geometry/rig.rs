@@ -14,6 +14,22 @@ use thiserror::Error;
 ///   u_left − u_right; [`StereoRig::disparity_from_shift`] turns it into d.
 ///
 /// A depth camera is a rig too: choose any baseline and its depth becomes a disparity.
+///
+/// A point 4 m ahead and 0.5 m to the right, seen with f = 400 px and b = 0.2 m:
+///
+/// ```
+/// use egomotion::geometry::StereoRig;
+/// use nalgebra::Vector3;
+///
+/// let rig = StereoRig::new(400.0, (319.5, 239.5), 0.2, (640, 480))?;
+/// // x = f X/Z and d = b f/Z.
+/// let xyd = Vector3::new(50.0, 0.0, 20.0);
+/// assert_eq!(rig.project(&Vector3::new(0.5, 0.0, 4.0)), Some(xyd));
+/// assert_eq!(rig.depth(20.0), Some(4.0));
+/// // A pixel of disparity is Z²/(b f) = 0.2 m of depth there.
+/// assert!((rig.point_jacobian(&xyd)[(2, 2)] + 0.2).abs() < 1e-12);
+/// # Ok::<(), egomotion::geometry::RigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StereoRig {
     /// Horizontal focal length fx, in pixels; the f of every formula.
@@ -170,7 +186,7 @@ impl StereoRig {
 
     /// Change of (x, y, d) when a point P of the left camera's frame moves by a little: ∂(x, y, d)/∂P · `change`.
     #[inline(always)]
-    pub fn projected_change(&self, p: &Vector3<f64>, change: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn projected_change(&self, p: &Vector3<f64>, change: &Vector3<f64>) -> Vector3<f64> {
         let k = self.focal_px / p.z;
         let kz = -k / p.z * change.z;
         Vector3::new(k * change.x + kz * p.x, k * change.y + kz * p.y, kz * self.baseline_m)

@@ -7,7 +7,7 @@ use crate::geometry::RigidMotion;
 pub const KITTI_LENGTHS_M: [f64; 8] = [100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0];
 
 /// KITTI starts a segment at every tenth frame.
-pub const KITTI_START_EVERY: usize = 10;
+const KITTI_START_EVERY: usize = 10;
 
 /// KITTI drift: errors of the relative motion over segments of given lengths, per metre travelled.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,15 +11,17 @@ mod section_seven;
 pub use absolute::{Similarity, TrajectoryAlignment, absolute_errors_m, align};
 pub use association::associate;
 pub use consistency::{Coverage, Nees};
-pub use drift::{Drift, KITTI_LENGTHS_M, KITTI_START_EVERY, kitti_drift};
+pub use drift::{Drift, KITTI_LENGTHS_M, kitti_drift};
 pub use relative::{
     Delta, PoseError, RelativePoseError, pairs, relative_pose_error, relative_pose_errors, travelled_m,
 };
 pub use section_seven::SectionSeven;
 
-/// What many errors have in common, in their own unit.
+pub use crate::geometry::order_statistics::quantile;
+
+/// Statistics of many errors, in their own unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spread {
+pub struct ErrorStatistics {
     /// Root mean square.
     pub rmse: f64,
     /// Mean.
@@ -38,7 +40,7 @@ pub struct Spread {
     pub count: usize,
 }
 
-impl Spread {
+impl ErrorStatistics {
     /// Of some errors; `None` if there are none.
     pub fn of(errors: &[f64]) -> Option<Self> {
         let mean = mean(errors)?;
@@ -55,18 +57,6 @@ impl Spread {
             count: errors.len(),
         })
     }
-}
-
-/// The `q` quantile (0 … 1), interpolated linearly between the sorted values; `None` if there are none.
-///
-/// At ½ it is the median, with the mean of the two middle values of an even count.
-pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().checked_sub(1)?;
-    let at = q.clamp(0.0, 1.0) * last as f64;
-    let (low, high) = (sorted[at.floor() as usize], sorted[(at.ceil() as usize).min(last)]);
-    Some(if low == high { low } else { low + (high - low) * at.fract() })
 }
 
 fn mean(values: &[f64]) -> Option<f64> {

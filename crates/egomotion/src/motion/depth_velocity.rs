@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix2, SMatrix, Vector2, Vector4};
 
-pub use super::rigid_prediction::{DisparityOffset, RigidPrediction};
+use crate::geometry::distribution::CHI2_1_P9973;
 use crate::geometry::{Field, Gaussian, StereoRig};
 use crate::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 
@@ -41,7 +41,7 @@ impl DepthVelocity {
     /// The same with Z at the beginning of the interval, of one that holds Z at its middle.
     ///
     /// Differential observations are taken half-way along the motion, Z_mid = Z + VZ/2.
-    pub fn from_middle(self) -> Self {
+    pub(crate) fn from_middle(self) -> Self {
         let [z_middle, vz] = self.z_vz.mean.into();
         let back = Matrix2::new(1.0, -0.5, 0.0, 1.0);
         Self { z_vz: self.z_vz.propagate(Vector2::new(z_middle - 0.5 * vz, vz), &back) }
@@ -169,7 +169,7 @@ pub fn exact_change(z_m: f64, after: &Field, u: f64, v: f64, rig: &StereoRig) ->
 ///
 /// They contradict when they differ by more than three standard deviations of the difference: then
 /// the pixel moves by itself.
-pub fn rigid_unless_moving(
+pub(crate) fn rigid_unless_moving(
     measured: Option<DepthVelocity>,
     rigid: Option<DepthVelocity>,
 ) -> Option<DepthVelocity> {
@@ -184,7 +184,7 @@ pub fn rigid_unless_moving(
 pub(crate) fn contradict(measured: &DepthVelocity, rigid: &DepthVelocity) -> bool {
     let (m, r) = (&measured.z_vz, &rigid.z_vz);
     let apart = m.mean.y - r.mean.y;
-    apart * apart > 9.0 * (m.cov.m22 + r.cov.m22)
+    apart * apart > CHI2_1_P9973 * (m.cov.m22 + r.cov.m22)
 }
 
 /// Smallest change of depth that a disparity step δ shows at disparity d, ΔZ = −Z/(1 + d/δ) in metres, (51).

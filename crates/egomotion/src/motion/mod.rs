@@ -1,10 +1,14 @@
-//! What the motion of pixels means: depth velocity and time to impact, each with its uncertainty.
+//! What the motion of pixels means: depth velocity, time to impact and the nearest obstacle, each with its uncertainty.
 
 pub mod depth_velocity;
-pub mod impact;
-pub mod obstacle;
+mod impact;
+mod obstacle;
 mod rigid_prediction;
+mod vehicle;
 
 pub use depth_velocity::DepthVelocity;
 pub use impact::TimeToImpact;
-pub use obstacle::{NoObstacle, Obstacle};
+pub(crate) use obstacle::nearest_obstacle;
+pub use obstacle::{NoObstacle, Obstacle, ObstacleCriteria, Sightings};
+pub use rigid_prediction::{DisparityOffset, RigidPrediction};
+pub use vehicle::Vehicle;

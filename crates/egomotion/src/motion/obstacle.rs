@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::TimeToImpact;
+use super::impact::TimeToImpact;
 use crate::geometry::{Cells, PixelBounds, upper_median};
 
 /// What will be met first if nothing changes its motion.
@@ -61,15 +61,16 @@ impl ObstacleCriteria {
     /// Every pixel is a point.
     pub const DENSE: Self = Self { cell_px: 16, cell_share: 0.25, region_points: 100 };
     /// Points are tracks, about thirty pixels apart.
-    pub const SPARSE: Self = Self { cell_px: 96, cell_share: 0.1, region_points: 3 };
+    pub(crate) const SPARSE: Self = Self { cell_px: 96, cell_share: 0.1, region_points: 3 };
 }
 
 /// Fewest crossing points of a cell that takes part: one or two may be mismatches.
-const CELL_POINTS: usize = 3;
-/// Neighbouring cells whose loomings differ by a larger share, and by more than their σ, are apart.
-const SAME_LOOMING: f64 = 0.2;
-/// The share of a region's cells that come before the one that answers for it.
-const FIRST_SHARE: f64 = 0.1;
+const LEAST_CROSSING_POINTS: usize = 3;
+/// Neighbouring cells show one surface when their loomings differ by at most this share of the larger one, or by no
+/// more than their noise: less would cut slanted surfaces apart, more would join what is met at different times.
+const SAME_SURFACE_SHARE: f64 = 0.2;
+/// This share of a region's cells is met before the one that answers for it: a single wrong cell must not.
+const SHARE_MET_BEFORE: f64 = 0.1;
 
 /// The points seen in one cell.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -82,7 +83,7 @@ pub struct Sightings {
 
 impl Sightings {
     /// Count one point, and whether it will pass through the vehicle's window.
-    pub fn add(&mut self, impact: TimeToImpact, crosses: bool) {
+    pub(crate) fn add(&mut self, impact: TimeToImpact, crosses: bool) {
         self.seen += 1;
         self.approaching += usize::from(impact.looming.value() > 0.0);
         self.crossing.extend(crosses.then_some(impact));
@@ -92,7 +93,7 @@ impl Sightings {
     /// their number: neighbours share their noise.
     fn median(&mut self, share: f64) -> Option<TimeToImpact> {
         let count = self.crossing.len();
-        let enough = count >= CELL_POINTS && count as f64 >= share * self.seen as f64;
+        let enough = count >= LEAST_CROSSING_POINTS && count as f64 >= share * self.seen as f64;
         upper_median(&mut self.crossing, by_looming).filter(|_| enough)
     }
 }
@@ -105,18 +106,18 @@ fn by_looming(a: &TimeToImpact, b: &TimeToImpact) -> std::cmp::Ordering {
 fn agree(a: &TimeToImpact, b: &TimeToImpact) -> bool {
     let (x, y) = (a.looming.value(), b.looming.value());
     let apart = (x - y).abs();
-    apart <= SAME_LOOMING * x.max(y) || apart * apart <= a.looming.variance() + b.looming.variance()
+    apart <= SAME_SURFACE_SHARE * x.max(y) || apart * apart <= a.looming.variance() + b.looming.variance()
 }
 
-/// The nearest obstacle among what was seen, one entry a cell of `belief` over an image of `image`
+/// The nearest obstacle among what was seen, one entry a cell of `criteria` over an image of `image`
 /// (width, height). The order of the points of a cell is lost.
 ///
 /// # Errors
 /// [`NoObstacle`] says why there is none.
-pub fn nearest(
+pub(crate) fn nearest_obstacle(
     seen: &mut [Sightings],
     image: (usize, usize),
-    belief: &ObstacleCriteria,
+    criteria: &ObstacleCriteria,
 ) -> Result<Obstacle, NoObstacle> {
     let total = |count: fn(&Sightings) -> usize| seen.iter().map(count).sum::<usize>();
     if total(|cell| cell.seen) == 0 {
@@ -128,15 +129,15 @@ pub fn nearest(
     if total(|cell| cell.crossing.len()) == 0 {
         return Err(NoObstacle::NothingCrosses);
     }
-    let cells = Cells::over(image, belief.cell_px);
+    let cells = Cells::tiling(image, criteria.cell_px);
     let medians: Vec<Option<TimeToImpact>> =
-        seen.iter_mut().map(|cell| cell.median(belief.cell_share)).collect();
+        seen.iter_mut().map(|cell| cell.median(criteria.cell_share)).collect();
     let of = |cell: usize| medians.get(cell).copied().flatten();
     let joined = |a, b| of(a).zip(of(b)).is_some_and(|(a, b)| agree(&a, &b));
     let regions = cells.regions(|cell| of(cell).is_some(), joined);
     let obstacles = regions.iter().filter_map(|region| {
         let points = region.iter().map(|&cell| seen[cell].crossing.len()).sum();
-        let bounds = cells.bounds(region).filter(|_| points >= belief.region_points)?;
+        let bounds = cells.bounds(region).filter(|_| points >= criteria.region_points)?;
         let impact = first(region.iter().filter_map(|&cell| of(cell)).collect())?;
         Some(Obstacle { impact, points, bounds })
     });
@@ -148,7 +149,7 @@ pub fn nearest(
 /// Which one that is is known to about a rank: half the step between its neighbours counts as an error.
 fn first(mut impacts: Vec<TimeToImpact>) -> Option<TimeToImpact> {
     impacts.sort_by(|a, b| by_looming(b, a));
-    let rank = (FIRST_SHARE * impacts.len() as f64).round() as usize;
+    let rank = (SHARE_MET_BEFORE * impacts.len() as f64).round() as usize;
     let looming = |rank: usize| impacts.get(rank).map(|impact| impact.looming.value());
     let mut found = *impacts.get(rank)?;
     let (before, after) = (looming(rank.saturating_sub(1))?, looming(rank + 1).or(looming(rank))?);
@@ -161,7 +162,7 @@ mod tests {
     use super::*;
     use crate::geometry::Gaussian;
 
-    const BELIEF: ObstacleCriteria = ObstacleCriteria { cell_px: 10, cell_share: 0.25, region_points: 20 };
+    const CRITERIA: ObstacleCriteria = ObstacleCriteria { cell_px: 10, cell_share: 0.25, region_points: 20 };
     /// 4 × 3 cells.
     const IMAGE: (usize, usize) = (40, 30);
 
@@ -182,7 +183,7 @@ mod tests {
     }
 
     fn found(crossing: &[(usize, usize, f64)]) -> Result<Obstacle, NoObstacle> {
-        nearest(&mut seen(crossing), IMAGE, &BELIEF)
+        nearest_obstacle(&mut seen(crossing), IMAGE, &CRITERIA)
     }
 
     #[test]
@@ -207,7 +208,7 @@ mod tests {
         // They are the same where the noise of either explains the difference.
         let mut noisy = seen(&[(0, 15, 0.5)]);
         (0..15).for_each(|_| noisy[1].add(impact(0.9, 0.5), true));
-        assert_eq!(nearest(&mut noisy, IMAGE, &BELIEF).unwrap().points, 30);
+        assert_eq!(nearest_obstacle(&mut noisy, IMAGE, &CRITERIA).unwrap().points, 30);
     }
 
     #[test]
@@ -215,8 +216,11 @@ mod tests {
         // 9 of 40 are less than a quarter, whatever the number of such cells.
         let thin: Vec<_> = (0..12).map(|cell| (cell, 9, 0.5)).collect();
         assert_eq!(found(&thin), Err(NoObstacle::OnlyScattered));
-        let two_points = ObstacleCriteria { cell_share: 0.0, region_points: 0, ..BELIEF };
-        assert_eq!(nearest(&mut seen(&[(0, 2, 0.5)]), IMAGE, &two_points), Err(NoObstacle::OnlyScattered));
+        let two_points = ObstacleCriteria { cell_share: 0.0, region_points: 0, ..CRITERIA };
+        assert_eq!(
+            nearest_obstacle(&mut seen(&[(0, 2, 0.5)]), IMAGE, &two_points),
+            Err(NoObstacle::OnlyScattered)
+        );
     }
 
     #[test]
@@ -233,12 +237,12 @@ mod tests {
     #[test]
     fn it_says_why_there_is_none() {
         let mut cells = vec![Sightings::default(); 12];
-        assert_eq!(nearest(&mut cells, IMAGE, &BELIEF), Err(NoObstacle::NothingMeasured));
+        assert_eq!(nearest_obstacle(&mut cells, IMAGE, &CRITERIA), Err(NoObstacle::NothingMeasured));
         cells[3].add(impact(-0.1, 0.01), false);
-        assert_eq!(nearest(&mut cells, IMAGE, &BELIEF), Err(NoObstacle::NothingApproaches));
+        assert_eq!(nearest_obstacle(&mut cells, IMAGE, &CRITERIA), Err(NoObstacle::NothingApproaches));
         cells[3].add(impact(0.1, 0.01), false);
-        assert_eq!(nearest(&mut cells, IMAGE, &BELIEF), Err(NoObstacle::NothingCrosses));
+        assert_eq!(nearest_obstacle(&mut cells, IMAGE, &CRITERIA), Err(NoObstacle::NothingCrosses));
         cells[3].add(impact(0.1, 0.01), true);
-        assert_eq!(nearest(&mut cells, IMAGE, &BELIEF), Err(NoObstacle::OnlyScattered));
+        assert_eq!(nearest_obstacle(&mut cells, IMAGE, &CRITERIA), Err(NoObstacle::OnlyScattered));
     }
 }

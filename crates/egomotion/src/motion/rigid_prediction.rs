@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix2, Matrix3, Matrix6, Vector2, Vector3, Vector6};
 
-use super::DepthVelocity;
+use super::depth_velocity::DepthVelocity;
+use crate::geometry::distribution::CHI2_2_P9973;
 use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
 
 /// The rigid motion φ with what every pixel's prediction shares.
@@ -73,7 +74,7 @@ impl<'a> RigidPrediction<'a> {
     ///
     /// It is not where it lies outside the ellipse that holds 99.7 % of what the noise of flow, of d
     /// (`d_variance`), of φ and of the calibration make of that point.
-    pub fn contradicts_flow(&self, xyd: &Vector3<f64>, d_variance: f64, flow: &Gaussian<2>) -> bool {
+    pub(crate) fn contradicts_flow(&self, xyd: &Vector3<f64>, d_variance: f64, flow: &Gaussian<2>) -> bool {
         let Some(predicted) = self.moved(xyd) else { return false };
         let Some(p) = self.rig.point(&predicted) else { return false };
         let apart = xyd.xy() + flow.mean - predicted.xy();
@@ -122,10 +123,10 @@ impl<'a> RigidPrediction<'a> {
     }
 }
 
-/// Whether eᵀ S⁻¹ e > χ²₂(0.997).
+/// Whether eᵀ S⁻¹ e > χ²₂(0.9973).
 fn outside(e: &Vector2<f64>, s: &Matrix2<f64>) -> bool {
     let q = e.x * e.x * s.m22 - 2.0 * e.x * e.y * s.m12 + e.y * e.y * s.m11;
-    q > 11.83 * (s.m11 * s.m22 - s.m12 * s.m12)
+    q > CHI2_2_P9973 * (s.m11 * s.m22 - s.m12 * s.m12)
 }
 
 /// vᵀ M v of v = (1, a, b) and a symmetric M.

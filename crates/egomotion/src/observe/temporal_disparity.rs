@@ -7,6 +7,7 @@
 
 use super::patch::{Freedom, Patch, Settling};
 use super::stereo_pyramid::StereoPyramid;
+use crate::geometry::distribution::CHI2_1_P9973;
 use crate::geometry::{Gaussian, Image};
 
 /// A hundredth of a pixel is below what noise leaves.
@@ -50,7 +51,7 @@ pub fn disparity_change(
         let right = found(&right_patch, &after.right_spline, guess)?;
         let (moved_left, moved_right) = (left.u - u, right.u - (u - seen.shift));
         let apart = (right.v - left.v).powi(2);
-        let plausible = apart < ROWS_APART_PX.powi(2) + 9.0 * (left.variance_v + right.variance_v);
+        let plausible = apart < ROWS_APART_PX.powi(2) + CHI2_1_P9973 * (left.variance_v + right.variance_v);
         let value = moved_left - moved_right;
         (plausible && (value - change).abs() < LARGEST_SURPRISE_PX)
             .then(|| Gaussian::scalar(value, left.variance_u + right.variance_u))

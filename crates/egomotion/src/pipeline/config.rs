@@ -4,12 +4,12 @@ use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::estimate::LmedsOptions;
+use crate::estimate::MaximumLikelihoodOptions;
+use crate::estimate::StudentT;
 use crate::estimate::Tolerance;
-use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
-use crate::estimate::linear::lmeds::LmedsOptions;
-use crate::estimate::linear::m_estimator::StudentT;
 use crate::geometry::RigError;
-use crate::motion::impact::Vehicle;
+use crate::motion::Vehicle;
 use crate::observe::disparity::AreaOptions;
 use crate::observe::flow::FlowError;
 use crate::observe::{DisparityOptions, FlowOptions, TrackOptions};

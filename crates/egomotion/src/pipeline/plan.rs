@@ -1,8 +1,8 @@
 //! What is done with each pair of frames: decided once, from the choices and from what makes the tracks.
 
 use super::config::{Approach, Config, Method, Observe};
+use crate::estimate::TrackSource;
 use crate::estimate::alignment::Form;
-use crate::estimate::sensor::tolerance::TrackSource;
 use crate::geometry::StereoRig;
 
 /// The equations that determine φ.

@@ -12,8 +12,8 @@ use super::memory::{Memory, TimedFrame};
 use super::plan::Interval;
 use super::solve::{Observed, first_motion, solve};
 use super::stages::{StageTimes, timed};
-use crate::estimate::median;
-use crate::estimate::sensor::tolerance::TrackSource;
+use crate::estimate::TrackSource;
+use crate::geometry::median;
 use crate::geometry::{Gaussian, StereoRig};
 use crate::observe::StereoTrack;
 

@@ -7,7 +7,7 @@ use crate::geometry::{Grid, Image};
 /// The point spread function ends at this many of its σ.
 const REACH_SIGMAS: f64 = 4.0;
 /// Largest σ, in pixels; beyond it an image shows nothing.
-pub const MAX_SIGMA_PX: f64 = 64.0;
+pub(super) const MAX_SIGMA_PX: f64 = 64.0;
 
 /// How far the light of a point spreads, in whole pixels; 0 without blur.
 pub(super) fn reach_px(sigma_px: f64) -> usize {

@@ -10,6 +10,11 @@ use super::blur::{self, blurred, reach_px};
 use super::render::{StereoImages, View};
 use crate::geometry::{Image, StereoRig};
 
+/// Most of the corners' light that vignetting takes, as a share: with all of it gone the fall-off has no end.
+const MAX_VIGNETTING: f64 = 0.99;
+/// Largest gain, offset in grey levels, noise or variance of a sensor: beyond, images of 8 bits show nothing.
+const LARGEST_LEVEL: f64 = 1e3;
+
 /// A pair of cameras that are not perfect, and not equal. `--noise sensor` is the default value.
 ///
 /// In the order in which they act: blur, vignetting, the right camera's gain and offset, noise, rounding.
@@ -48,9 +53,6 @@ pub struct SensorError {
     /// Greatest value that it may have.
     pub high: f64,
 }
-
-/// Most of the corners' light that vignetting takes.
-const MAX_VIGNETTING: f64 = 0.99;
 
 impl Default for SensorNoise {
     fn default() -> Self {
@@ -95,10 +97,10 @@ impl SensorNoise {
         let bounds = [
             ("blur_px", self.blur_px, 0.0, blur::MAX_SIGMA_PX),
             ("vignetting", self.vignetting, 0.0, MAX_VIGNETTING),
-            ("right_gain", self.right_gain, 0.0, 1e3),
-            ("right_offset", self.right_offset, -1e3, 1e3),
-            ("read_sigma", self.read_sigma, 0.0, 1e3),
-            ("shot_gain", self.shot_gain, 0.0, 1e3),
+            ("right_gain", self.right_gain, 0.0, LARGEST_LEVEL),
+            ("right_offset", self.right_offset, -LARGEST_LEVEL, LARGEST_LEVEL),
+            ("read_sigma", self.read_sigma, 0.0, LARGEST_LEVEL),
+            ("shot_gain", self.shot_gain, 0.0, LARGEST_LEVEL),
         ];
         let bad = bounds.into_iter().find(|(_, value, low, high)| !(low..=high).contains(&value));
         bad.map_or(Ok(()), |(quantity, value, low, high)| Err(SensorError { quantity, value, low, high }))

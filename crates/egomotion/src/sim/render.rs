@@ -7,7 +7,7 @@ use super::scene::{Hit, Scene};
 use crate::geometry::{Grid, Image, RigidMotion, StereoRig};
 
 /// Surface id of a pixel that sees nothing.
-pub const NOTHING: u16 = u16::MAX;
+pub(super) const NOTHING: u16 = u16::MAX;
 
 /// A scene seen by a stereo rig at one pose. The left camera stands at (−b/2, 0, 0) of the cyclopean frame.
 #[derive(Debug, Clone, Copy)]

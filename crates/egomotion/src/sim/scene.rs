@@ -8,16 +8,16 @@ use super::shape::Shape;
 use super::texture::Texture;
 
 /// The most parts of a scene: a surface id has 16 bits.
-pub const MAX_PARTS: usize = 10_000;
+pub(super) const MAX_PARTS: usize = 10_000;
 /// Number of surface ids that a part takes: a box has six faces.
 const FACES: u16 = 6;
-/// Where the texture saturates, in its standard deviations: keeps every grey level above zero.
+/// Where the texture saturates, in its standard deviations: it keeps every grey level above zero.
 const SATURATION: f64 = 2.4;
 /// Light that reaches every surface, whatever its direction, as a share of full light.
 const AMBIENT: f64 = 0.5;
 /// Difference between neighbouring tiles, as a share of their mean.
 const TILE_CONTRAST: f64 = 0.3;
-/// A part's shade reaches this many of its radii.
+/// A part's shade reaches this many of its radii: further it would hardly be seen, and cost as much.
 const SHADE_REACH: f64 = 5.0;
 
 /// One part of a scene.

@@ -8,7 +8,7 @@ use crate::geometry::{RigidMotion, StereoRig, Twist};
 
 /// Constant motions of section 7.1 and ours: name, then (tX, tY, tZ) in mm and Ω in degrees per frame,
 /// as scene motion of the cyclopean camera.
-const CONSTANT: [(&str, [f64; 6]); 5] = [
+const CONSTANT_MOTIONS: [(&str, [f64; 6]); 5] = [
     ("A", [0.0, 0.0, -5.0, 0.0, 0.0, 0.0]),
     ("B", [0.0, 0.0, 0.0, 0.0, -0.25, 0.0]),
     ("C", [10.0, -10.0, -15.0, 0.1, 0.1, 0.0]),
@@ -18,7 +18,7 @@ const CONSTANT: [(&str, [f64; 6]); 5] = [
 
 /// Constant motions of section 7.2 (Table 2, with the signs of Tables 4, 5 and 7), in [`Scene::lab_room`]; the
 /// paper has no K.
-const LAB: [(&str, [f64; 6]); 12] = [
+const LAB_MOTIONS: [(&str, [f64; 6]); 12] = [
     ("lab-A", [0.0, 0.0, 0.0, 0.0, -0.25, 0.0]),
     ("lab-B", [0.0, 0.0, 0.0, 0.0, -0.5, 0.0]),
     ("lab-C", [0.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
@@ -34,7 +34,7 @@ const LAB: [(&str, [f64; 6]); 12] = [
 ];
 
 /// Frames of a constant sequence where the caller does not say.
-const FRAMES: usize = 10;
+const DEFAULT_FRAMES: usize = 10;
 /// Frames of the demonstration: further ones would drive into the obstacle.
 const DEMO_FRAMES: usize = 24;
 /// Time between two frames of the demonstration, in seconds.
@@ -58,12 +58,12 @@ pub struct Sequence {
 impl Sequence {
     /// Every name that [`Sequence::named`] knows.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        CONSTANT.iter().map(|(name, _)| *name).chain(["demo"]).chain(Self::lab_names())
+        CONSTANT_MOTIONS.iter().map(|(name, _)| *name).chain(["demo"]).chain(Self::lab_names())
     }
 
     /// The names of the manipulator's sequences, in the paper's order.
     pub fn lab_names() -> impl Iterator<Item = &'static str> {
-        LAB.iter().map(|(name, _)| *name)
+        LAB_MOTIONS.iter().map(|(name, _)| *name)
     }
 
     /// The sequence of that name (any case); `None` if there is none.
@@ -87,11 +87,11 @@ impl Sequence {
         let known = |list: &[(&'static str, [f64; 6])]| {
             list.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).copied()
         };
-        let paper = known(&CONSTANT).map(|found| (found, Scene::paper_room as fn() -> Scene));
+        let paper = known(&CONSTANT_MOTIONS).map(|found| (found, Scene::paper_room as fn() -> Scene));
         let ((name, motion), scene) =
-            paper.or_else(|| known(&LAB).map(|found| (found, Scene::lab_room as _)))?;
+            paper.or_else(|| known(&LAB_MOTIONS).map(|found| (found, Scene::lab_room as _)))?;
         let motions =
-            vec![twist_from_mm_deg(&motion).scaled(step); frames.unwrap_or(FRAMES).saturating_sub(1)];
+            vec![twist_from_mm_deg(&motion).scaled(step); frames.unwrap_or(DEFAULT_FRAMES).saturating_sub(1)];
         Some(Self::new(name, scene(), paper_rig(size_px.unwrap_or((320, 240)))?, 1.0, motions))
     }
 

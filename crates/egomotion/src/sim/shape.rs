@@ -69,7 +69,7 @@ impl Default for Turn {
 
 /// Where a ray meets a shape first.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Meeting {
+pub(super) struct Meeting {
     /// Ray parameter s > 0 of origin + s · direction.
     pub s: f64,
     /// Unit normal of the surface, against the ray.
@@ -134,7 +134,7 @@ impl Shape {
     }
 
     /// First meeting of the ray origin + s · direction, s > 0, with the surface; `None` if it misses.
-    pub fn meet(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Meeting> {
+    pub(super) fn meet(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Option<Meeting> {
         match self {
             Self::Plane { normal, offset_m } => meet_plane(normal, *offset_m, origin, direction),
             Self::Quad { centre, half_m: [a, b] } => {
@@ -178,7 +178,7 @@ impl Shape {
     }
 
     /// A ball that throws about the same shade: centre and radius; `None` for flat shapes.
-    pub fn shade_ball(&self) -> Option<(Vector3<f64>, f64)> {
+    pub(super) fn shade_ball(&self) -> Option<(Vector3<f64>, f64)> {
         match self {
             Self::Sphere { centre, radius_m } => Some((*centre, *radius_m)),
             Self::Box { centre, half_m, .. } => Some((*centre, 1.15 * half_m.product().cbrt())),

@@ -8,16 +8,24 @@ use rand_distr::{Distribution, UnitSphere};
 use rand_pcg::Pcg64Mcg;
 
 /// Shortest wavelength, in metres.
-pub const SHORTEST_M: f64 = 0.015;
+pub(super) const SHORTEST_M: f64 = 0.015;
 /// Longest wavelength, in metres.
-pub const LONGEST_M: f64 = 0.9;
+pub(super) const LONGEST_M: f64 = 0.9;
 
 /// Standard deviation of the pixel's Gaussian aperture (optics and sensor area together), in pixels.
 const APERTURE_PX: f64 = 0.5;
 /// Amplitude grows with this power of the wavelength: 1.5 times from the shortest to the longest.
-const TILT: f64 = 0.1;
+const AMPLITUDE_EXPONENT: f64 = 0.1;
+/// Waves side by side in a block: as many as a vector register holds.
 const LANES: usize = 8;
-const BLOCKS: usize = 16;
+/// Blocks of waves: 128 waves together, so that each octave has more than twenty.
+const WAVE_BLOCKS: usize = 16;
+/// q/4 per (cycles per pixel)² of the aperture's attenuation exp(−q), q = ½ (2π σ)² (cycles per pixel)². It is taken as
+/// (1 − q/4)⁴, which ends at 1.1 px.
+const QUARTER_ATTENUATION: f32 = (0.125 * TAU * TAU * APERTURE_PX * APERTURE_PX) as f32;
+
+/// 1.5·2²³: adding and subtracting it rounds a number to the nearest integer.
+const ROUNDER: f32 = 12_582_912.0;
 
 /// Plane waves side by side, so that the sum over them vectorises.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,19 +53,19 @@ impl Texture {
     pub fn new(seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let mut waves =
-            vec![Waves { k: [[0.0; LANES]; 3], phase: [0.0; LANES], amplitude: [0.0; LANES] }; BLOCKS];
+            vec![Waves { k: [[0.0; LANES]; 3], phase: [0.0; LANES], amplitude: [0.0; LANES] }; WAVE_BLOCKS];
         let (mut place, mut variance) = (0.0, 0.0);
         for block in &mut waves {
             for lane in 0..LANES {
                 // Stratified, so that no octave is left empty by chance.
-                let share = (place + rng.random::<f64>()) / (BLOCKS * LANES) as f64;
+                let share = (place + rng.random::<f64>()) / (WAVE_BLOCKS * LANES) as f64;
                 let wavelength = LONGEST_M * (SHORTEST_M / LONGEST_M).powf(share);
                 let direction: [f64; 3] = UnitSphere.sample(&mut rng);
                 for (k, c) in block.k.iter_mut().zip(direction) {
                     k[lane] = (c / wavelength) as f32;
                 }
                 block.phase[lane] = rng.random();
-                let amplitude = wavelength.powf(TILT);
+                let amplitude = wavelength.powf(AMPLITUDE_EXPONENT);
                 block.amplitude[lane] = amplitude as f32;
                 variance += 0.5 * amplitude * amplitude;
                 place += 1.0;
@@ -87,13 +95,11 @@ impl Texture {
 impl Waves {
     #[inline]
     fn add(&self, p: &[f32; 3], du: &[f32; 3], dv: &[f32; 3], sums: &mut [f32; LANES]) {
-        // q = ½ (2π σ)² (cycles per pixel)², and exp(−q) ≈ (1 − q/4)⁴, which ends at 1.1 px.
-        const Q: f32 = (0.125 * TAU * TAU * APERTURE_PX * APERTURE_PX) as f32;
         for (lane, sum) in sums.iter_mut().enumerate() {
             let [x, y, z] = [self.k[0][lane], self.k[1][lane], self.k[2][lane]];
             let a = x * du[0] + y * du[1] + z * du[2];
             let b = x * dv[0] + y * dv[1] + z * dv[2];
-            let w = (1.0 - Q * (a * a + b * b)).max(0.0);
+            let w = (1.0 - QUARTER_ATTENUATION * (a * a + b * b)).max(0.0);
             let w = w * w;
             *sum += self.amplitude[lane] * w * w * cosine(x * p[0] + y * p[1] + z * p[2] + self.phase[lane]);
         }
@@ -103,9 +109,7 @@ impl Waves {
 /// cos(2π c) to 4e-6, without branches or library calls so that it vectorises; |c| below 4 million cycles.
 #[inline]
 fn cosine(cycles: f32) -> f32 {
-    // Adding and subtracting 1.5·2²³ rounds to the nearest integer.
-    const ROUND: f32 = 12_582_912.0;
-    let r = cycles - ((cycles + ROUND) - ROUND);
+    let r = cycles - ((cycles + ROUNDER) - ROUNDER);
     let x = std::f32::consts::TAU * (0.25 - r.abs());
     let s = x * x;
     x * (1.0

@@ -4,8 +4,7 @@ use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::render::View;
-use crate::geometry::perspective::image_flow;
-use crate::geometry::{Field, Grid, RigidMotion, StereoRig, Twist};
+use crate::geometry::{Field, Grid, RigidMotion, StereoRig, Twist, image_flow};
 
 /// What a pixel of the left camera sees.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -38,6 +38,7 @@ struct Pixel {
     visible: u8,
 }
 
+/// A pixel that sees nothing.
 const NOTHING: Pixel =
     Pixel { shift: f32::NAN, depth: f32::NAN, depth_velocity: f32::NAN, flow: [f32::NAN; 2], visible: 0 };
 

@@ -1,8 +1,7 @@
 //! Points scattered in front of the paper's rig, observed without error.
 #![allow(dead_code, reason = "each test program uses a part of it")]
 
-use egomotion::geometry::perspective::image_flow;
-use egomotion::geometry::{Gaussian, StereoRig, Twist};
+use egomotion::geometry::{Gaussian, StereoRig, Twist, image_flow};
 use egomotion::observe::{DepthFlow, StereoFlow, StereoTrack};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 use rand::{RngExt, SeedableRng};

@@ -2,7 +2,7 @@
 
 mod pictures;
 
-use egomotion::estimate::{MotionEstimate, Undetermined};
+use egomotion::estimate::{MotionEstimate, UndeterminedDirections};
 use egomotion::geometry::{Gaussian, Image, PixelBounds, RigidMotion, StereoRig, Twist};
 use egomotion::motion::{NoObstacle, Obstacle, TimeToImpact};
 use egomotion::pipeline::MovingGroup;
@@ -22,7 +22,7 @@ pub struct Run {
 /// φ with all components observed, each with the variance `variance`.
 pub fn motion(phi: &Vector6<f64>, variance: f64) -> MotionEstimate {
     let theta = Gaussian { mean: *phi, cov: Matrix6::from_diagonal_element(variance) };
-    let undetermined = Undetermined::default();
+    let undetermined = UndeterminedDirections::default();
     MotionEstimate { theta, observed: [true; 6], undetermined, rows: 900, inliers: 800, residual_scale: 1.0 }
 }
 

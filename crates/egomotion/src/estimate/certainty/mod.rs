@@ -1,5 +1,6 @@
-//! How certain an estimate is: its covariance by blocks, and which directions of motion are observed.
+//! How well an estimate is known: its covariance, and what the data do not determine.
 
-pub mod blocks;
-pub mod observability;
-pub mod undetermined;
+pub(super) mod blocks;
+pub(super) mod covariance;
+pub(super) mod observability;
+pub(super) mod undetermined;

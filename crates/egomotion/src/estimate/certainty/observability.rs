@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-use crate::estimate::{Undetermined, Unsolvable};
+use super::undetermined::UndeterminedDirections;
+use crate::estimate::unsolvable::Unsolvable;
 
 /// Eigenvalues of the scaled information below this share of the largest count as zero.
 ///
@@ -17,8 +18,8 @@ const NEGLIGIBLE: f64 = 1e-24;
 /// Components with more of themselves than this (squared) in an undetermined direction are unobservable.
 const NULL_SHARE: f64 = 1e-6;
 
-/// The most of [`NULL_SHARE`] where noise makes directions uncertain.
-const MOST_LEAN: f64 = 0.05;
+/// [`NULL_SHARE`] grows up to this where noise makes directions uncertain: more would call observed what is not.
+const LARGEST_NULL_SHARE: f64 = 0.05;
 
 /// The eigen-analysis of a scaled information matrix.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,7 +41,7 @@ impl Observability {
     ///
     /// # Errors
     /// [`Unsolvable::NotFinite`] when an entry is NaN or infinite, [`Unsolvable::Unobservable`] when all are zero.
-    pub fn of<const N: usize>(information: &SMatrix<f64, N, N>) -> Result<Self, Unsolvable> {
+    pub(crate) fn of<const N: usize>(information: &SMatrix<f64, N, N>) -> Result<Self, Unsolvable> {
         if !information.iter().all(|v| v.is_finite()) {
             return Err(Unsolvable::NotFinite);
         }
@@ -71,7 +72,7 @@ impl Observability {
     ///
     /// # Errors
     /// As [`Observability::of`]; [`Unsolvable::Unobservable`] too when no direction exceeds what is uncertain.
-    pub fn beyond_noise<const N: usize>(
+    pub(crate) fn beyond_noise<const N: usize>(
         information: &SMatrix<f64, N, N>,
         noise: &SMatrix<f64, N, N>,
         uncertain: impl Fn(&SVector<f64, N>) -> f64,
@@ -97,7 +98,7 @@ impl Observability {
         // An eigenvector leans towards another by the matrix's error over the difference of their eigenvalues.
         let weakest = found.determined().map(|k| found.eigenvalues[k]).fold(f64::INFINITY, f64::min);
         let lean = found.floors.max() / weakest;
-        found.null_share = (lean * lean).clamp(NULL_SHARE, MOST_LEAN);
+        found.null_share = (lean * lean).clamp(NULL_SHARE, LARGEST_NULL_SHARE);
         Ok(found)
     }
 
@@ -120,23 +121,23 @@ impl Observability {
     }
 
     /// The directions that are not determined.
-    pub fn undetermined<const N: usize>(&self) -> Undetermined<N> {
+    pub fn undetermined<const N: usize>(&self) -> UndeterminedDirections<N> {
         let kept: Vec<usize> = self.determined().collect();
         // What no row speaks of has no scale of its own.
         let scale = |i: usize| if self.scale[i] > 0.0 { self.scale[i] } else { self.scale.max() };
         let direction = |k: usize| SVector::from_fn(|i, _| self.eigenvectors[(i, k)] * scale(i));
         let free = (0..self.eigenvalues.len()).filter(|k| !kept.contains(k));
-        Undetermined::spanned(free.map(direction), self.null_share.sqrt())
+        UndeterminedDirections::spanned(free.map(direction), self.null_share.sqrt())
     }
 
     /// θ as far as it is determined: the unobserved components at zero.
-    pub fn known<const N: usize>(&self, theta: &SVector<f64, N>) -> SVector<f64, N> {
+    pub(crate) fn with_unobserved_zero<const N: usize>(&self, theta: &SVector<f64, N>) -> SVector<f64, N> {
         let observed: [bool; N] = self.observed();
         SVector::from_fn(|i, _| if observed[i] { theta[i] } else { 0.0 })
     }
 
     /// The whitening matrix W, N × rank: W Wᵀ is the (pseudo-)inverse of the information.
-    pub fn whitening(&self) -> DMatrix<f64> {
+    pub(crate) fn whitening(&self) -> DMatrix<f64> {
         let kept: Vec<usize> = self.determined().collect();
         DMatrix::from_fn(self.scale.len(), kept.len(), |i, j| {
             self.scale[i] * self.eigenvectors[(i, kept[j])] / self.eigenvalues[kept[j]].sqrt()
@@ -147,7 +148,7 @@ impl Observability {
     ///
     /// # Errors
     /// [`Unsolvable::NotFinite`] when the moment is not finite.
-    pub fn solve<const N: usize>(
+    pub(crate) fn solve<const N: usize>(
         &self,
         information: &SMatrix<f64, N, N>,
         moment: &SVector<f64, N>,

@@ -5,26 +5,35 @@ use std::fmt;
 use nalgebra::{DMatrix, Matrix6, SVector, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::array;
+use crate::estimate::serde_array;
 use crate::geometry::Twist;
+
+/// How sharply directions are known where nobody says, as a share of their length.
+const DEFAULT_TOLERANCE: f64 = 1e-3;
+/// A direction lies in those already known when less than this share of it is left without them: rounding errors.
+const LEAST_NEW_PART: f64 = 1e-9;
+/// A direction is named after an axis where its cosine with it exceeds this: two decimals would be 1 and 0.
+const AXIS_COSINE: f64 = 0.999_95;
+/// An axis goes through the camera's centre where it passes nearer than this, in metres: two decimals would be 0.
+const LEAST_OFFSET_M: f64 = 5e-3;
 
 /// The directions of N unknowns that the data do not determine: a basis of what may be added to θ unseen.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Undetermined<const N: usize> {
-    #[serde(with = "array")]
+pub struct UndeterminedDirections<const N: usize> {
+    #[serde(with = "serde_array")]
     directions: [SVector<f64, N>; N],
     count: usize,
     /// How sharply the directions are known, as a share of their length.
     tolerance: f64,
 }
 
-impl<const N: usize> Default for Undetermined<N> {
+impl<const N: usize> Default for UndeterminedDirections<N> {
     fn default() -> Self {
-        Self { directions: [SVector::zeros(); N], count: 0, tolerance: 1e-3 }
+        Self { directions: [SVector::zeros(); N], count: 0, tolerance: DEFAULT_TOLERANCE }
     }
 }
 
-impl<const N: usize> Undetermined<N> {
+impl<const N: usize> UndeterminedDirections<N> {
     /// The span of some directions, known to a share `tolerance` of their length.
     pub fn spanned(directions: impl IntoIterator<Item = SVector<f64, N>>, tolerance: f64) -> Self {
         let mut found = Self { tolerance, ..Self::default() };
@@ -43,13 +52,13 @@ impl<const N: usize> Undetermined<N> {
     }
 
     /// One direction more, unless it lies in those already there.
-    pub fn include(&mut self, direction: &SVector<f64, N>) {
+    pub(crate) fn include(&mut self, direction: &SVector<f64, N>) {
         let Some(direction) = direction.try_normalize(0.0) else { return };
         // Once more takes away what rounding left.
         let rest =
             |v: SVector<f64, N>| self.directions().iter().fold(v, |v, known| v - known * known.dot(&v));
         let rest = rest(rest(direction));
-        if self.count < N && rest.norm() > 1e-9 {
+        if self.count < N && rest.norm() > LEAST_NEW_PART {
             self.directions[self.count] = rest.normalize();
             self.count += 1;
         }
@@ -57,7 +66,7 @@ impl<const N: usize> Undetermined<N> {
 
     /// The same with components of which nothing is known.
     #[must_use]
-    pub fn with_components(mut self, components: impl IntoIterator<Item = usize>) -> Self {
+    pub(crate) fn with_components(mut self, components: impl IntoIterator<Item = usize>) -> Self {
         components
             .into_iter()
             .for_each(|i| self.include(&SVector::from_fn(|j, _| f64::from(u8::from(i == j)))));
@@ -67,7 +76,7 @@ impl<const N: usize> Undetermined<N> {
 
 /// A motion of the scene that the data do not see.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FreeMotion {
+pub enum UndeterminedMotion {
     /// A shift along a direction of length 1.
     Shift {
         /// The direction.
@@ -91,15 +100,15 @@ pub enum FreeMotion {
     },
 }
 
-impl Undetermined<6> {
+impl UndeterminedDirections<6> {
     /// The same directions of another camera's φ; `matrix` is that of [`Twist::seen_from_matrix`].
     #[must_use]
-    pub fn transformed(&self, matrix: &Matrix6<f64>) -> Self {
+    pub(crate) fn transformed(&self, matrix: &Matrix6<f64>) -> Self {
         Self::spanned(self.directions().iter().map(|direction| matrix * direction), self.tolerance)
     }
 
     /// A readable basis: pure shifts first, then turns, then screws.
-    pub fn motions(&self) -> Vec<FreeMotion> {
+    pub fn motions(&self) -> Vec<UndeterminedMotion> {
         if self.count == 0 {
             return Vec::new();
         }
@@ -118,23 +127,25 @@ impl Undetermined<6> {
             }
         }
         let (shifts, turns) = (reduced(shifts, 0, self.tolerance), reduced(turns, 3, self.tolerance));
-        let free = Undetermined::<3>::spanned(shifts.iter().map(part::<0>), self.tolerance);
+        let free = UndeterminedDirections::<3>::spanned(shifts.iter().map(part::<0>), self.tolerance);
         let turns = turns.iter().map(|motion| self.turn(motion, &free));
-        let (pure, screws): (Vec<_>, Vec<_>) = turns.partition(|m| matches!(m, FreeMotion::Turn { .. }));
-        let shifts = shifts.iter().map(|motion| FreeMotion::Shift { along: part::<0>(motion).normalize() });
+        let (pure, screws): (Vec<_>, Vec<_>) =
+            turns.partition(|m| matches!(m, UndeterminedMotion::Turn { .. }));
+        let shifts =
+            shifts.iter().map(|motion| UndeterminedMotion::Shift { along: part::<0>(motion).normalize() });
         shifts.chain(pure).chain(screws).collect()
     }
 
     /// A motion that turns: with any of the free shifts added it is as free, so the one with none of them.
-    fn turn(&self, motion: &Vector6<f64>, free: &Undetermined<3>) -> FreeMotion {
+    fn turn(&self, motion: &Vector6<f64>, free: &UndeterminedDirections<3>) -> UndeterminedMotion {
         let rate = part::<3>(motion).norm();
         let (about, shift) = (part::<3>(motion) / rate, part::<0>(motion) / rate);
         let shift = free.directions().iter().fold(shift, |shift, known| shift - known * known.dot(&shift));
         let (pitch, through) = (shift.dot(&about), about.cross(&shift));
         if pitch.abs() <= self.tolerance * (1.0 + shift.norm()) {
-            FreeMotion::Turn { about, through }
+            UndeterminedMotion::Turn { about, through }
         } else {
-            FreeMotion::Screw { about, through, pitch }
+            UndeterminedMotion::Screw { about, through, pitch }
         }
     }
 }
@@ -165,7 +176,7 @@ fn reduced(mut motions: Vec<Vector6<f64>>, first: usize, tolerance: f64) -> Vec<
     motions
 }
 
-impl FreeMotion {
+impl UndeterminedMotion {
     /// The motion as a twist of length 1: per metre of shift, or per radian.
     pub fn twist(&self) -> Twist {
         match *self {
@@ -191,15 +202,18 @@ fn triple(v: &Vector3<f64>) -> String {
 
 /// `x`, `y`, `z`, or three numbers.
 fn direction(v: &Vector3<f64>) -> String {
-    let axis = ["x", "y", "z"].iter().enumerate().find(|(i, _)| v[*i].abs() > 0.999_95);
+    let axis = ["x", "y", "z"].iter().enumerate().find(|(i, _)| v[*i].abs() > AXIS_COSINE);
     axis.map_or_else(|| triple(v), |(_, name)| (*name).to_owned())
 }
 
-impl fmt::Display for FreeMotion {
+impl fmt::Display for UndeterminedMotion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let axis = |about: &Vector3<f64>, through: &Vector3<f64>| {
-            let place =
-                if through.amax() < 5e-3 { String::new() } else { format!(" through {} m", triple(through)) };
+            let place = if through.amax() < LEAST_OFFSET_M {
+                String::new()
+            } else {
+                format!(" through {} m", triple(through))
+            };
             format!("turn about {}{place}", direction(about))
         };
         match self {
@@ -213,9 +227,9 @@ impl fmt::Display for FreeMotion {
 }
 
 /// Motions separated by semicolons; nothing where all is determined.
-impl fmt::Display for Undetermined<6> {
+impl fmt::Display for UndeterminedDirections<6> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let words: Vec<String> = self.motions().iter().map(FreeMotion::to_string).collect();
+        let words: Vec<String> = self.motions().iter().map(UndeterminedMotion::to_string).collect();
         f.write_str(&words.join("; "))
     }
 }
@@ -227,7 +241,7 @@ mod tests {
     /// The twist of a turn about an axis through a point, with a shift along it.
     fn turn(about: [f64; 3], through: [f64; 3], pitch: f64) -> Vector6<f64> {
         let about = Vector3::from(about).normalize();
-        FreeMotion::Screw { about, through: through.into(), pitch }.twist().vector()
+        UndeterminedMotion::Screw { about, through: through.into(), pitch }.twist().vector()
     }
 
     fn shift(along: [f64; 3]) -> Vector6<f64> {
@@ -243,7 +257,7 @@ mod tests {
                 .map(|(i, d)| d * (1.0 + ((i + 2) * (k + 1)) as f64).sin())
                 .sum::<Vector6<f64>>()
         };
-        Undetermined::spanned((0..directions.len()).map(mix), 1e-3).to_string()
+        UndeterminedDirections::spanned((0..directions.len()).map(mix), 1e-3).to_string()
     }
 
     #[test]
@@ -276,20 +290,20 @@ mod tests {
             turn([0.0, 1.0, 1.0], [1.0, 0.0, 2.0], 0.0),
             shift([0.2, 0.1, 1.0]),
         ];
-        let undetermined = Undetermined::spanned(given, 1e-3);
+        let undetermined = UndeterminedDirections::spanned(given, 1e-3);
         let motions = undetermined.motions();
         assert_eq!(motions.len(), 3);
         let mut span = undetermined;
         motions.iter().for_each(|motion| span.include(&motion.twist().vector()));
         assert_eq!(span.count(), 3, "{motions:?}");
-        let named = Undetermined::spanned(motions.iter().map(|m| m.twist().vector()), 1e-3);
+        let named = UndeterminedDirections::spanned(motions.iter().map(|m| m.twist().vector()), 1e-3);
         assert_eq!(named.count(), 3);
     }
 
     #[test]
     fn another_camera_sees_the_same_axis_elsewhere() {
         let centre = Vector3::new(-0.5, 0.0, 0.0);
-        let here = Undetermined::spanned([turn([0.0, 1.0, 0.0], [0.2, 0.0, 2.0], 0.0)], 1e-3);
+        let here = UndeterminedDirections::spanned([turn([0.0, 1.0, 0.0], [0.2, 0.0, 2.0], 0.0)], 1e-3);
         let there = here.transformed(&Twist::seen_from_matrix(&centre));
         assert_eq!(there.to_string(), "turn about y through (0.7, 0, 2) m");
     }

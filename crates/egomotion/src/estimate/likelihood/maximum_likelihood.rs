@@ -5,20 +5,43 @@
 //! derivative by φ, Gauss–Newton solves Σ Gᵀ S⁻¹ G δ = Σ Gᵀ S⁻¹ e; a zero variance before the
 //! motion is legal because S, never the measurement's covariance alone, is inverted. Robust
 //! weights are functions of q = eᵀ S⁻¹ e: those of Student's t beside a share of outliers, both as the
-//! residuals have them ([`crate::estimate::likelihood::mixture`]).
+//! residuals have them (the mixture of a t and outliers).
 
 use documented::DocumentedFields;
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::certainty::blocks::{self, BlockScore, Blocks};
-use crate::estimate::likelihood::mixture::Mixture;
-use crate::estimate::likelihood::step::{Step, Sums, Weighing};
-use crate::estimate::linear::m_estimator::{LEAST_SCALE2, StudentT};
-use crate::estimate::measurement::{At, Measurement, median_square, squares};
-use crate::estimate::sensor::systematic::CommonErrors;
-use crate::estimate::{Estimate, MotionEstimate, Observability, Unsolvable};
+use super::mixture::ResidualModel;
+use super::score_sums::{FrameSums, LikelihoodTerm, ScoreSums, Weighing, median_square, squares};
+use super::systematic::SystematicResponse;
+use crate::constrain::{LinearisationPoint, Measurement};
+use crate::estimate::certainty::blocks::{BlockScore, Blocks};
+use crate::estimate::certainty::covariance::{covariance, model_covariance};
+use crate::estimate::certainty::observability::Observability;
+use crate::estimate::motion_estimate::{Estimate, MotionEstimate};
+use crate::estimate::student_t::{LEAST_SCALE2, StudentT};
+use crate::estimate::unsolvable::Unsolvable;
 use crate::geometry::{Gaussian, StereoRig, Twist};
+
+/// An answer is not believed whose median of q is this many times that of the robust start: a mixture fitted to few
+/// observations may see some that happen to agree, and call the others outliers.
+const ASTRAY_MEDIAN_RATIO: f64 = 1.5;
+/// About this many observations bring the iteration near its end before all of them are used: fewer are cheaper, and
+/// leave more to the steps over all.
+const COARSE_OBSERVATIONS: usize = 4096;
+/// The iteration over few observations ends when φ moves by less than this share of its standard deviation; then the
+/// residuals are looked at again.
+const COARSE_TOLERANCE: f64 = 0.3;
+/// The residuals are looked at again this often on the way, since far from the end they do not look as they do there.
+const RESIDUAL_FITS: usize = 2;
+/// Newton's steps are taken at most this often. Where they do not settle, Gauss–Newton's follow: each of them is one of
+/// expectation and maximisation, by which the likelihood does not fall.
+const NEWTON_STEPS: usize = 12;
+/// Newton's step is taken unless it is this many times as long as Gauss–Newton's: far from the end the likelihood may
+/// be flat in some direction, and Newton's step too long.
+const LONGEST_NEWTON_STEP: f64 = 3.0;
+/// Steps are taken to shrink at least by this factor from one to the next, when their sum is foretold.
+const SLOWEST_SHRINKING: f64 = 0.5;
 
 /// How maximum likelihood iterates and weighs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
@@ -34,7 +57,7 @@ pub struct MaximumLikelihoodOptions {
     pub start_observations: usize,
     /// Seed of the robust start.
     pub seed: u64,
-    /// Standard deviation of the phase error's amplitude, in pixels; see [`crate::estimate::sensor::systematic`].
+    /// Standard deviation of the phase error's amplitude, in pixels; see [`crate::estimate::SystematicResponse`].
     pub phase_error_px: f64,
 }
 
@@ -58,14 +81,37 @@ pub struct MaximumLikelihood {
     pub motion: MotionEstimate,
     /// Σ eᵀ S⁻¹ e at the estimate, without robust weights.
     pub cost: f64,
-    /// How φ̂ answers to errors that all observations share; `None` where some direction is not determined.
-    pub common: Option<CommonErrors>,
-    /// How residuals were weighed, in units of the squared scale.
-    pub(crate) mixture: Mixture,
-    pub(crate) scale2: f64,
+    /// How φ̂ answers to systematic errors; `None` where some direction is not determined.
+    pub systematic: Option<SystematicResponse>,
+    /// How residuals were weighed.
+    pub(crate) residuals: ResidualModel,
 }
 
 /// Maximise the likelihood from a start.
+///
+/// Sixty points that move towards the rig by 0.1 m and turn about Y by 0.01 rad, each measured to 0.1 px:
+///
+/// ```
+/// use egomotion::estimate::{StudentT, maximum_likelihood};
+/// use egomotion::geometry::{Gaussian, StereoRig, Twist};
+/// use egomotion::observe::StereoTrack;
+/// use nalgebra::{Matrix3, Vector3};
+///
+/// let rig = StereoRig::new(400.0, (319.5, 239.5), 0.2, (640, 480))?;
+/// let truth = Twist { t: Vector3::new(0.0, 0.0, -0.1), omega: Vector3::new(0.0, 0.01, 0.0) };
+/// let seen = |point: &Vector3<f64>| -> Option<Gaussian<3>> {
+///     Some(Gaussian { mean: rig.project(point)?, cov: Matrix3::identity() * 0.1 * 0.1 })
+/// };
+/// let tracks: Vec<StereoTrack> = (0..60)
+///     .map(|i| Vector3::new((i % 8) as f64 - 3.5, (i % 5) as f64 - 2.0, 4.0 + 0.1 * i as f64))
+///     .filter_map(|p| Some(StereoTrack { before: seen(&p)?, after: seen(&truth.exp().apply(&p))? }))
+///     .collect();
+/// let gaussian = StudentT { nu: f64::INFINITY, ..StudentT::default() };
+/// let found = maximum_likelihood(&tracks, &rig, &Twist::zero(), None, &gaussian)?;
+/// assert!((found.motion.phi().vector() - truth.vector()).amax() < 1e-6);
+/// assert!(found.motion.theta.sigma(2) < 0.01, "tZ is known to millimetres");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// With `blocks` the covariance is block-wise, without them it is the model's: the inverse
 /// Gauss–Newton information with the structure eliminated, at the estimated structure, with a robust kernel
@@ -74,22 +120,24 @@ pub struct MaximumLikelihood {
 /// # Errors
 /// [`Unsolvable`] with fewer than three usable observations, without any determined direction, or
 /// when it does not settle.
-pub fn maximum_likelihood<M: Measurement>(
+pub fn maximum_likelihood<M: LikelihoodTerm>(
     observations: &[M],
     rig: &StereoRig,
     start: &Twist,
     blocks: Option<&Blocks>,
     kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
-    let stride = (observations.len() / COARSE).max(1);
+    let stride = (observations.len() / COARSE_OBSERVATIONS).max(1);
     let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
     let found = maximise(observations, &few, rig, start, blocks, kernel);
     if !(kernel.nu.is_finite() && kernel.fitted) {
         return found;
     }
-    // Of few observations a mixture may see but some that happen to agree, and call the others outliers.
     let astray = match &found {
-        Ok(found) => median_square(&found.motion.phi(), &few, rig) > ASTRAY * median_square(start, &few, rig),
+        Ok(found) => {
+            median_square(&found.motion.phi(), &few, rig)
+                > ASTRAY_MEDIAN_RATIO * median_square(start, &few, rig)
+        }
         Err(why) => *why == Unsolvable::NotConverged,
     };
     if astray {
@@ -98,11 +146,8 @@ pub fn maximum_likelihood<M: Measurement>(
     found
 }
 
-/// An answer is not believed whose median of q is so many times that of the robust start.
-const ASTRAY: f64 = 1.5;
-
 /// The maximum near a start; `few` of the observations bring the iteration near its end.
-fn maximise<M: Measurement>(
+fn maximise<M: LikelihoodTerm>(
     observations: &[M],
     few: &[M],
     rig: &StereoRig,
@@ -110,51 +155,42 @@ fn maximise<M: Measurement>(
     blocks: Option<&Blocks>,
     kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
-    let search = Search::begin(observations, rig, start, kernel)?.approach(few, rig, kernel)?;
-    let (found, sums) = search.settle(observations, rig, blocks, kernel)?;
+    let near = Iterate::begin(observations, rig, start, kernel)?.approach(few, rig, kernel)?;
+    let (found, sums) = near.settle(observations, rig, blocks, kernel)?;
     finish(&found, &sums, observations.len(), blocks, kernel)
 }
 
-/// About so many observations bring the iteration near its end before all of them are used.
-const COARSE: usize = 4096;
-/// How near, as a share of the standard deviation, is near enough to look at the residuals again,
-const ROUGH: f64 = 0.3;
-/// which is done so often.
-const LOOKS: usize = 2;
-
 /// Where the iteration is.
 #[derive(Debug, Clone, Copy)]
-struct Search {
+struct Iterate {
     phi: Twist,
-    /// What the misclosures look like in units of their stated covariance, times the squared scale.
-    mixture: Mixture,
-    scale2: f64,
+    residuals: ResidualModel,
 }
 
-impl Search {
+impl Iterate {
     /// Residuals as they are at a motion.
-    fn begin<M: Measurement>(
+    fn begin<M: LikelihoodTerm>(
         observations: &[M],
         rig: &StereoRig,
         phi: &Twist,
         kernel: &StudentT,
     ) -> Result<Self, Unsolvable> {
-        let stride = observations.len().div_ceil(COARSE).max(1);
+        let stride = observations.len().div_ceil(COARSE_OBSERVATIONS).max(1);
         let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
-        let (mixture, scale2) = Mixture::of(kernel, &mut squares(&few, &At::new(*phi, rig)))
+        let residuals = ResidualModel::of(kernel, &mut squares(&few, &LinearisationPoint::new(*phi, rig)))
             .ok_or(Unsolvable::FewRows { rows: 0, needed: 3 })?;
-        Ok(Self { phi: *phi, mixture, scale2 })
+        Ok(Self { phi: *phi, residuals })
     }
 
     /// Near the end: what residuals look like far from it is not what they look like there.
-    fn approach<M: Measurement>(
+    fn approach<M: LikelihoodTerm>(
         mut self,
         observations: &[M],
         rig: &StereoRig,
         kernel: &StudentT,
     ) -> Result<Self, Unsolvable> {
-        let rough = StudentT { tolerance: ROUGH, ..*kernel };
-        for _ in 0..if kernel.nu.is_finite() && kernel.fitted { LOOKS } else { 1 } {
+        let rough = StudentT { tolerance: COARSE_TOLERANCE, ..*kernel };
+        for _ in 0..if kernel.nu.is_finite() && kernel.fitted { RESIDUAL_FITS } else { 1 } {
             // Few observations may leave open what all determine.
             let Ok((found, _)) = self.settle(observations, rig, None, &rough) else { return Ok(self) };
             self = Self::begin(observations, rig, &found.phi, kernel)?;
@@ -163,37 +199,37 @@ impl Search {
     }
 
     /// Iterate until φ moves by less than the tolerance; with the sums of the last step.
-    fn settle<M: Measurement>(
+    fn settle<M: LikelihoodTerm>(
         mut self,
         observations: &[M],
         rig: &StereoRig,
         blocks: Option<&Blocks>,
         kernel: &StudentT,
-    ) -> Result<(Self, Sums), Unsolvable> {
+    ) -> Result<(Self, FrameSums), Unsolvable> {
         let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
         let mut last = 0.0;
         for iteration in 0..kernel.iterations {
-            let at = At::new(self.phi, rig);
-            let weighing = Weighing { blocks, mixture: self.mixture, scale2: self.scale2 };
-            let sums = Sums::over(observations, &mut structures, &at, &weighing);
+            let at = LinearisationPoint::new(self.phi, rig);
+            let weighing = Weighing { blocks, residuals: self.residuals };
+            let sums = FrameSums::linearised(observations, &mut structures, &at, &weighing);
             let step = &sums.whole;
             if step.used < 3 {
                 return Err(Unsolvable::FewRows { rows: step.used, needed: 3 });
             }
-            let delta = direction(step, iteration < NEWTON)?;
+            let delta = direction(step, iteration < NEWTON_STEPS)?;
             self.phi = Twist::from_vector(&(self.phi.vector() + delta));
             // Beside outliers a scale that follows the weights, which follow the scale, may shrink to nothing: it stays
             // as it was found (the MM-estimator of Yohai 1987).
-            if kernel.nu.is_finite() && !self.mixture.has_outliers() {
-                self.scale2 = step.scale2().max(LEAST_SCALE2);
+            if kernel.nu.is_finite() && !self.residuals.mixture.has_outliers() {
+                self.residuals.scale2 = step.scale2().max(LEAST_SCALE2);
             }
             let moved = delta.dot(&(step.score.information * delta)).max(0.0).sqrt();
             // Steps that shrink by a factor are followed by ones that sum up to this.
-            let factor = (moved / last).min(0.5);
+            let factor = (moved / last).min(SLOWEST_SHRINKING);
             let rest = moved * factor / (1.0 - factor);
             last = moved;
             // The first step was one with structures as measured: where it ends depends on their noise.
-            if iteration > 0 && rest <= kernel.tolerance * self.scale2.sqrt() {
+            if iteration > 0 && rest <= kernel.tolerance * self.residuals.scale2.sqrt() {
                 return Ok((self, sums));
             }
         }
@@ -202,7 +238,7 @@ impl Search {
 }
 
 /// The step of φ: Newton's, with the weights' own change, near the end; Gauss–Newton's elsewhere.
-fn direction(step: &Step, newton: bool) -> Result<Vector6<f64>, Unsolvable> {
+fn direction(step: &ScoreSums, newton: bool) -> Result<Vector6<f64>, Unsolvable> {
     let (information, score) = (&step.score.information, &step.score.score);
     let observability = Observability::of(information)?;
     let plain = observability.solve(information, score)?;
@@ -210,21 +246,16 @@ fn direction(step: &Step, newton: bool) -> Result<Vector6<f64>, Unsolvable> {
         return Ok(plain);
     }
     let newton = step.bread().cholesky().map(|bread| bread.solve(score));
-    // Far from the end the likelihood may be flat in some direction, and Newton's step too long.
     let length = |v: &Vector6<f64>| v.dot(&(information * v));
-    Ok(newton.filter(|newton| length(newton) <= LONGEST.powi(2) * length(&plain)).unwrap_or(plain))
+    Ok(newton
+        .filter(|newton| length(newton) <= LONGEST_NEWTON_STEP.powi(2) * length(&plain))
+        .unwrap_or(plain))
 }
-
-/// Where Newton's steps do not settle, from so many on only Gauss–Newton's are taken: each of them is one of expectation
-/// and maximisation, by which the likelihood does not fall.
-const NEWTON: usize = 12;
-/// Newton's step is taken unless so many times as long as Gauss–Newton's.
-const LONGEST: f64 = 3.0;
 
 /// The answer from the sums of the last step, which was less than the tolerance.
 fn finish(
-    found: &Search,
-    sums: &Sums,
+    found: &Iterate,
+    sums: &FrameSums,
     rows: usize,
     blocks: Option<&Blocks>,
     kernel: &StudentT,
@@ -234,15 +265,15 @@ fn finish(
     let cov = match blocks {
         Some(_) => {
             let scores: Vec<BlockScore<6>> = sums.by_block.iter().map(|step| step.score).collect();
-            blocks::covariance(&scores, whole.bread().try_inverse().as_ref(), &observability)
+            covariance(&scores, whole.bread().try_inverse().as_ref(), &observability)
         }
-        None if kernel.nu.is_infinite() => blocks::model_covariance(1.0, &observability),
-        None => blocks::model_covariance(whole.spread(), &observability),
+        None if kernel.nu.is_infinite() => model_covariance(1.0, &observability),
+        None => model_covariance(whole.spread(), &observability),
     };
     let freedom = (3 * whole.used).saturating_sub(6).max(1) as f64;
     Ok(MaximumLikelihood {
         motion: Estimate {
-            theta: Gaussian { mean: observability.known(&found.phi.vector()), cov },
+            theta: Gaussian { mean: observability.with_unobserved_zero(&found.phi.vector()), cov },
             observed: observability.observed(),
             undetermined: observability.undetermined(),
             rows,
@@ -250,43 +281,58 @@ fn finish(
             residual_scale: (whole.weighted_square / freedom).sqrt(),
         },
         cost: whole.square,
-        common: CommonErrors::of(whole),
-        mixture: found.mixture,
-        scale2: found.scale2,
+        systematic: SystematicResponse::of(whole),
+        residuals: found.residuals,
     })
 }
 
-/// The inverse Fisher information of φ at a known motion and structure: no unbiased estimator does better.
-///
-/// `None` when some direction is not determined.
-pub fn cramer_rao_bound<M: Measurement>(
-    observations: &[M],
-    rig: &StereoRig,
-    phi: &Twist,
-) -> Option<Matrix6<f64>> {
-    let structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
-    Some(efficient(observations, &structures, rig, phi)?.cov)
-}
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
 
-/// What no unbiased estimator does better than: one Gauss–Newton step from the true motion and structures.
-///
-/// Its covariance is the Cramér–Rao bound, and its error has exactly that covariance as long as the noise has
-/// the one it states: estimators are compared with it draw by draw. `None` when some direction is not determined.
-pub fn efficient<M: Measurement>(
-    observations: &[M],
-    structures: &[Vector3<f64>],
-    rig: &StereoRig,
-    phi: &Twist,
-) -> Option<Gaussian<6>> {
-    let gaussian = StudentT { nu: f64::INFINITY, ..StudentT::default() };
-    let weighing = Weighing { blocks: None, mixture: Mixture::student(&gaussian), scale2: 1.0 };
-    let sums = Sums::over(observations, &mut structures.to_vec(), &At::new(*phi, rig), &weighing);
-    let BlockScore { information, score } = sums.whole.score;
-    let observability = Observability::of(&information).ok()?;
-    let observed: [bool; 6] = observability.observed();
-    let step = observability.solve(&information, &score).ok()?;
-    observed
-        .iter()
-        .all(|&o| o)
-        .then(|| Gaussian { mean: phi.vector() + step, cov: blocks::model_covariance(1.0, &observability) })
+    use super::*;
+    use crate::constrain::phase_wave;
+    use crate::estimate::likelihood::systematic::systematic_response;
+    use crate::observe::StereoTrack;
+
+    fn tracks(rig: &StereoRig, phi: &Twist, amplitude: Vector3<f64>, offset: f64) -> Vec<StereoTrack> {
+        let variances = [0.01, 0.01, 0.02];
+        let place = |i: usize| {
+            let (a, b, c) = ((i * 37 % 200) as f64, (i * 53 % 150) as f64, (i * 17 % 31) as f64);
+            Vector3::new(a - 100.0, b - 75.0, 8.0 + c)
+        };
+        let moved = |xyd: &Vector3<f64>| rig.project(&phi.exp().apply(&rig.point(xyd).unwrap())).unwrap();
+        let d = Vector3::new(0.0, 0.0, offset);
+        let seen = |i: usize| {
+            let (before, after) = (place(i), moved(&place(i)));
+            let moved = (after - before).xy().map(phase_wave);
+            let phase = Vector3::new(moved.x, moved.y, phase_wave(after.z)).component_mul(&amplitude);
+            (before + Vector3::z() * amplitude.z * phase_wave(before.z) + d, after + phase + d)
+        };
+        let track = |(before, after): (Vector3<f64>, Vector3<f64>)| StereoTrack {
+            before: Gaussian::independent(before.into(), [0.0, 0.0, 0.02]),
+            after: Gaussian::independent(after.into(), variances),
+        };
+        (0..120).map(|i| track(seen(i))).collect()
+    }
+
+    #[test]
+    fn the_response_is_what_the_estimator_does() {
+        let rig = StereoRig::new(400.0, (159.5, 119.5), 0.15, (320, 240)).unwrap();
+        let phi = Twist { t: Vector3::new(0.02, -0.01, -0.2), omega: Vector3::new(0.004, -0.006, 0.002) };
+        let kernel = StudentT { nu: f64::INFINITY, iterations: 50, tolerance: 1e-10, ..StudentT::default() };
+        let solve = |amplitude, offset| {
+            let tracks = tracks(&rig, &phi, amplitude, offset);
+            maximum_likelihood(&tracks, &rig, &phi, None, &kernel).unwrap().motion.theta.mean - phi.vector()
+        };
+        let exact = tracks(&rig, &phi, Vector3::zeros(), 0.0);
+        let found = systematic_response(&exact, &rig, &phi, &kernel).unwrap();
+        let scale = found.phi_per_offset_px.amax();
+        for k in 0..3 {
+            let error = solve(Vector3::ith(k, 1e-3), 0.0) / 1e-3 - found.phi_per_phase_px.column(k);
+            assert!(error.amax() < 2e-3 * found.phi_per_phase_px.column(k).amax(), "{k} {error}");
+        }
+        let error = solve(Vector3::zeros(), 1e-3) / 1e-3 - found.phi_per_offset_px;
+        assert!(error.amax() < 2e-3 * scale, "{error} {scale}");
+    }
 }

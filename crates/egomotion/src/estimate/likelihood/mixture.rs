@@ -6,33 +6,37 @@
 //! little is lost; front ends on real images have heavier tails (ν small); outliers, even those that agree with
 //! each other, are left without any weight, because their density says nothing about the motion.
 
-use crate::estimate::linear::m_estimator::{LEAST_SCALE2, StudentT};
-use crate::estimate::median;
+use crate::estimate::student_t::{LEAST_SCALE2, StudentT};
+use crate::geometry::distribution::CHI2_3_P50;
+use crate::geometry::median;
 
-/// Median of χ²₃.
-pub(crate) const MEDIAN: f64 = 2.366;
 /// Dimension of a residual.
 const DIMENSION: f64 = 3.0;
-
-/// Exponents m of the densities (1 + q/ν)^−m that are tried: ν = 2 m − 3 = 3, 7, 17, 97.
+/// The exponents m of the densities (1 + q/ν)^−m that are tried: ν = 2 m − 3 = 3, 7, 17, 97.
 ///
 /// Whole exponents spare an exponential for each observation. The last loses less than a thousandth on
 /// Gaussian residuals.
-const EXPONENTS: [i32; 4] = [3, 5, 10, 50];
-/// The density of outliers is that of (CORE + q)^(−3/2).
-const CORE: f64 = 3.0;
-/// The mixture is fitted to about so many residuals.
-const MOST: usize = 500;
-/// Iterations for each exponent, from the result of the last.
-const ITERATIONS: usize = 8;
-/// Outliers reach so many times the first scale at least.
-const LEAST_REACH: f64 = 10.0;
-/// Least and greatest share of outliers.
-const SHARE: (f64, f64) = (1e-3, 0.7);
+const TRIED_EXPONENTS: [i32; 4] = [3, 5, 10, 50];
+/// The density of outliers is that of (c + q)^(−3/2) with this c, in units of the squared scale: they have no scale, and
+/// c keeps their density finite at zero, where it would outgrow the inliers'.
+const OUTLIER_CORE_Q: f64 = 3.0;
+/// The mixture is fitted to at most this many residuals, so that its cost does not grow with their number.
+const FITTED_RESIDUALS: usize = 500;
+/// Iterations of expectation and maximisation for each exponent, each from the result of the last.
+const ITERATIONS_PER_EXPONENT: usize = 8;
+/// The share of outliers from which the first iteration starts.
+const FIRST_OUTLIER_SHARE: f64 = 0.1;
+/// Outliers reach at least this many times the first scale: a shorter range would make those near the inliers likelier.
+const LEAST_OUTLIER_REACH: f64 = 10.0;
+/// Least and greatest share of outliers: a share of zero would stay zero, and a greater one lets a few residuals that
+/// happen to agree pass for all inliers.
+const OUTLIER_SHARE_BOUNDS: (f64, f64) = (1e-3, 0.7);
+/// ν before an exponent was tried; the first likelihood replaces it.
+const FIRST_NU: f64 = 4.0;
 
 /// The weights of residuals in units of their scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Mixture {
+pub(crate) struct Mixture {
     /// ν; infinite is the Gaussian.
     nu: f64,
     /// (ν + 3)/2 where outliers have a share.
@@ -43,12 +47,12 @@ pub struct Mixture {
 
 impl Mixture {
     /// Student's t alone.
-    pub fn student(kernel: &StudentT) -> Self {
+    pub(crate) fn student(kernel: &StudentT) -> Self {
         Self { nu: kernel.nu, exponent: 0, odds: 0.0 }
     }
 
     /// Nearly Gaussian, with half the weight at `q` and soon none.
-    pub fn within(q: f64) -> Self {
+    pub(crate) fn within(q: f64) -> Self {
         let exponent = 50;
         let nu = degrees(exponent);
         Self { nu, exponent, odds: (1.0 + q / nu).powi(-exponent) / scale_free(q) }
@@ -56,7 +60,7 @@ impl Mixture {
 
     /// Weight of a residual of squared length `q`, and −2 ∂ ln weight/∂q.
     #[inline(always)]
-    pub fn weight(&self, q: f64) -> (f64, f64) {
+    pub(crate) fn weight(&self, q: f64) -> (f64, f64) {
         if self.nu.is_infinite() {
             return (1.0, 0.0);
         }
@@ -66,12 +70,12 @@ impl Mixture {
             return (student, 2.0 / distance);
         }
         let inlier = self.inlier(q);
-        let falling = f64::from(self.exponent) / distance - 0.5 * DIMENSION / (CORE + q);
+        let falling = f64::from(self.exponent) / distance - 0.5 * DIMENSION / (OUTLIER_CORE_Q + q);
         (student * inlier, 2.0 * (1.0 / distance + falling * (1.0 - inlier)))
     }
 
     /// Whether outliers have a share: then far residuals have no weight at all.
-    pub fn has_outliers(&self) -> bool {
+    pub(crate) fn has_outliers(&self) -> bool {
         self.odds > 0.0
     }
 
@@ -81,31 +85,43 @@ impl Mixture {
         let x = 1.0 + q / self.nu;
         1.0 / (1.0 + self.odds * x.powi(self.exponent) * scale_free(q))
     }
+}
 
-    /// The mixture that a kernel asks for, and the squared scale of the residuals, from their squared lengths.
+/// How the misclosures of a frame are distributed: their scale, and the mixture in units of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ResidualModel {
+    /// The mixture, in units of the squared scale.
+    pub mixture: Mixture,
+    /// Squared scale of the misclosures in units of their stated covariance.
+    pub scale2: f64,
+}
+
+impl ResidualModel {
+    /// The model that a kernel asks for, from the squared lengths of the residuals.
     ///
     /// `None` without residuals. Reorders `squares`.
-    pub fn of(kernel: &StudentT, squares: &mut [f64]) -> Option<(Self, f64)> {
+    pub(crate) fn of(kernel: &StudentT, squares: &mut [f64]) -> Option<Self> {
+        let student = |scale2| Self { mixture: Mixture::student(kernel), scale2 };
         if kernel.nu.is_infinite() {
-            return Some((Self::student(kernel), 1.0));
+            return Some(student(1.0));
         }
         if squares.is_empty() {
             return None;
         }
-        let stride = squares.len().div_ceil(MOST);
+        let stride = squares.len().div_ceil(FITTED_RESIDUALS);
         let few: Vec<f64> = squares.iter().step_by(stride).copied().collect();
-        let scale2 = (median(squares) / MEDIAN).max(LEAST_SCALE2);
-        Some(if kernel.fitted { fitted(&few, scale2) } else { (Self::student(kernel), scale2) })
+        let scale2 = (median(squares) / CHI2_3_P50).max(LEAST_SCALE2);
+        Some(if kernel.fitted { fitted(&few, scale2) } else { student(scale2) })
     }
 }
 
-/// The most likely mixture, and its squared scale; `scale2` is a first guess.
-fn fitted(squares: &[f64], scale2: f64) -> (Mixture, f64) {
-    let reach2 = squares.iter().copied().fold(LEAST_REACH * LEAST_REACH * scale2, f64::max);
-    let mut fit = Fit { scale2, share: 0.1, reach2, squares };
-    let mut best = (f64::NEG_INFINITY, Mixture { nu: 4.0, exponent: 0, odds: 0.0 }, scale2);
-    for exponent in EXPONENTS {
-        for _ in 0..ITERATIONS {
+/// The most likely model; `scale2` is a first guess.
+fn fitted(squares: &[f64], scale2: f64) -> ResidualModel {
+    let reach2 = squares.iter().copied().fold(LEAST_OUTLIER_REACH * LEAST_OUTLIER_REACH * scale2, f64::max);
+    let mut fit = MixtureFit { scale2, share: FIRST_OUTLIER_SHARE, reach2, squares };
+    let mut best = (f64::NEG_INFINITY, Mixture { nu: FIRST_NU, exponent: 0, odds: 0.0 }, scale2);
+    for exponent in TRIED_EXPONENTS {
+        for _ in 0..ITERATIONS_PER_EXPONENT {
             fit.improve(exponent);
         }
         let likelihood = fit.log_likelihood(exponent);
@@ -114,11 +130,11 @@ fn fitted(squares: &[f64], scale2: f64) -> (Mixture, f64) {
         }
         best = (likelihood, fit.mixture(exponent), fit.scale2);
     }
-    (best.1, best.2)
+    ResidualModel { mixture: best.1, scale2: best.2 }
 }
 
 /// Expectation and maximisation over the scale and the share of outliers.
-struct Fit<'a> {
+struct MixtureFit<'a> {
     scale2: f64,
     share: f64,
     /// The longest squared length of an outlier.
@@ -126,7 +142,7 @@ struct Fit<'a> {
     squares: &'a [f64],
 }
 
-impl Fit<'_> {
+impl MixtureFit<'_> {
     fn mixture(&self, exponent: i32) -> Mixture {
         let odds = self.share / (1.0 - self.share) * self.outlier_peak() / self.peak(exponent);
         Mixture { nu: degrees(exponent), exponent, odds }
@@ -137,9 +153,9 @@ impl Fit<'_> {
         gamma_ratio(exponent) / (degrees(exponent) * std::f64::consts::PI * self.scale2).powf(0.5 * DIMENSION)
     }
 
-    /// Density of outliers at zero: with r in units of √CORE s, ∫ r² (1 + r²)^(−3/2) dr = asinh r − r/√(1 + r²).
+    /// Density of outliers at zero: with r in units of √c s, ∫ r² (1 + r²)^(−3/2) dr = asinh r − r/√(1 + r²).
     fn outlier_peak(&self) -> f64 {
-        let core2 = CORE * self.scale2;
+        let core2 = OUTLIER_CORE_Q * self.scale2;
         let reach2 = self.reach2 / core2;
         let reach = reach2.sqrt();
         let integral = reach.asinh() - reach / (1.0 + reach2).sqrt();
@@ -156,7 +172,8 @@ impl Fit<'_> {
             weights += weight;
             square += weight * q;
         }
-        self.share = (1.0 - inliers / self.squares.len() as f64).clamp(SHARE.0, SHARE.1);
+        self.share =
+            (1.0 - inliers / self.squares.len() as f64).clamp(OUTLIER_SHARE_BOUNDS.0, OUTLIER_SHARE_BOUNDS.1);
         if weights > 0.0 {
             self.scale2 = (square / (DIMENSION * weights)).max(LEAST_SCALE2);
         }
@@ -173,10 +190,10 @@ impl Fit<'_> {
     }
 }
 
-/// (1 + q/CORE)^(−3/2).
+/// (1 + q/c)^(−3/2).
 #[inline(always)]
 fn scale_free(q: f64) -> f64 {
-    let y = 1.0 + q / CORE;
+    let y = 1.0 + q / OUTLIER_CORE_Q;
     1.0 / (y * y.sqrt())
 }
 
@@ -215,8 +232,8 @@ mod tests {
 
     #[test]
     fn densities_are_those_of_probabilities() {
-        let fit = Fit { scale2: 1.7, share: 0.0, reach2: 400.0, squares: &[] };
-        for exponent in EXPONENTS {
+        let fit = MixtureFit { scale2: 1.7, share: 0.0, reach2: 400.0, squares: &[] };
+        for exponent in TRIED_EXPONENTS {
             let (peak, nu) = (fit.peak(exponent), degrees(exponent));
             let total = total(1e6, |q| peak / (1.0 + q / (nu * fit.scale2)).powi(exponent));
             assert!((total - 1.0).abs() < 1e-4, "{exponent}: {total}");
@@ -260,7 +277,8 @@ mod tests {
                 4.0 * if nu.is_infinite() { length2 } else { length2 * 3.0 / chi2 }
             };
             let mut squares: Vec<f64> = (0..2000).map(square).collect();
-            let (found, scale2) = Mixture::of(&StudentT::default(), &mut squares).unwrap();
+            let ResidualModel { mixture: found, scale2 } =
+                ResidualModel::of(&StudentT::default(), &mut squares).unwrap();
             // With 500 residuals the scale of a Gaussian is known to √(2/1500) = 3.7 %, that of a t, beside ν, to twice that.
             assert!((scale2 / 4.0 - 1.0).abs() < 0.25, "{nu} {share}: {found:?} {scale2}");
             if nu.is_infinite() {

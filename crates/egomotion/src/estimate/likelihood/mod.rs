@@ -1,6 +1,8 @@
-//! Maximum likelihood of observations: where it starts, how it steps, and how it weighs residuals.
+//! Maximum likelihood of observations: where it starts, how it steps, how it weighs residuals, and what moves all of them.
 
-pub mod maximum_likelihood;
-pub mod mixture;
-pub mod robust_start;
-pub(crate) mod step;
+pub(super) mod cramer_rao;
+pub(super) mod maximum_likelihood;
+pub(super) mod mixture;
+pub(super) mod robust_start;
+pub(super) mod score_sums;
+pub(super) mod systematic;

@@ -6,37 +6,37 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::maximum_likelihood::MaximumLikelihoodOptions;
+use super::mixture::{Mixture, ResidualModel};
+use super::score_sums::{FrameSums, Weighing, median_square, squares};
+use crate::constrain::{LinearisationPoint, Measurement};
 use crate::estimate::alignment::{Form, Moments, PointPair};
-use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
-use crate::estimate::likelihood::mixture::{MEDIAN, Mixture};
-use crate::estimate::likelihood::step::{Sums, Weighing};
-use crate::estimate::linear::lmeds::{random_subsets, trials};
-use crate::estimate::linear::m_estimator::LEAST_SCALE2;
-use crate::estimate::measurement::{At, Measurement, median_square, squares};
-use crate::estimate::{Observability, Unsolvable, median};
-use crate::geometry::{StereoRig, Twist};
+use crate::estimate::certainty::observability::Observability;
+use crate::estimate::random_subsets::{random_subsets, subsets_needed};
+use crate::estimate::student_t::LEAST_SCALE2;
+use crate::estimate::unsolvable::Unsolvable;
+use crate::geometry::distribution::{CHI2_3_P50, CHI2_3_P95};
+use crate::geometry::{StereoRig, Twist, median};
 use crate::observe::StereoTrack;
 
-/// Subsets are drawn anew, so many times at most,
+/// Subsets are drawn anew at most this often, while [`IMPLAUSIBLE_MEDIAN`] is exceeded.
 const ROUNDS: u64 = 4;
-/// while the least median of q is above so many times that of noise: half of all tracks are then outliers, or the
-/// search has failed, as three noisy points do now and then beside a large moving body.
-const PLAUSIBLE: f64 = 4.0;
-
-/// Candidates are first judged on about so many observations,
+/// A search has failed when the least median of q is this many times that of noise: half of all tracks are then
+/// outliers, or three noisy points were taken beside a large moving body, as happens now and then.
+const IMPLAUSIBLE_MEDIAN: f64 = 4.0;
+/// Candidates are first judged on about this many observations: enough to drop the bad ones cheaply.
 const FIRST_LOOK: usize = 100;
-/// so many of them are improved on these,
+/// This many of the candidates that looked best first are improved on those observations.
 const FINALISTS: usize = 16;
-/// and so many of those on all.
-const IMPROVED: usize = 4;
-/// Steps by which a candidate is improved,
+/// This many of the improved finalists are improved again, on all observations.
+const IMPROVED_ON_ALL: usize = 4;
+/// Steps by which a candidate is improved each time: fewer leave it noisier, more take longer.
 const CONCENTRATIONS: usize = 4;
-/// by observations whose q, were the median that of χ²₃, is below this: its 95th percentile.
-const NEAR: f64 = 7.8;
-
-/// A motion is no longer improved whose median of q is below so many times that of noise: most of the tracks fit,
+/// Observations improve a candidate whose q is below this, were the median of q that of noise.
+const CONCENTRATION_Q: f64 = CHI2_3_P95;
+/// A motion is no longer improved whose median of q is below this many times that of noise: most of the tracks fit,
 /// as is the rule when it was predicted.
-const FITS: f64 = 1.5;
+const FITTING_MEDIAN: f64 = 1.5;
 
 /// A robust start for tracks: the three-point alignment, or the prior, with the least median of q.
 ///
@@ -58,7 +58,7 @@ pub fn robust_start(
     let search = StartSearch { pairs: &pairs, sample: &sample, rig, options };
     let mut found = search.round(0, prior)?;
     for round in 1..ROUNDS {
-        if found.0 < PLAUSIBLE * MEDIAN {
+        if found.0 < IMPLAUSIBLE_MEDIAN * CHI2_3_P50 {
             break;
         }
         let again = search.round(round, None)?;
@@ -87,20 +87,20 @@ impl StartSearch<'_> {
         };
         let finalists = best(&candidates, FINALISTS, &glance, rig);
         let first = finalists.first().map(|(_, phi)| (median_square(phi, sample, rig), *phi));
-        if let Some(fits) = first.filter(|(middle, _)| *middle < FITS * MEDIAN) {
+        if let Some(fits) = first.filter(|(middle, _)| *middle < FITTING_MEDIAN * CHI2_3_P50) {
             return Ok(fits);
         }
         let finalists = improve(finalists, &glance);
-        let improved = improve(best(&finalists, IMPROVED, sample, rig), sample);
+        let improved = improve(best(&finalists, IMPROVED_ON_ALL, sample, rig), sample);
         best(&improved, 1, sample, rig).first().copied().ok_or(Unsolvable::Unobservable)
     }
 
     /// Alignments of three points each.
     fn candidates(&self, round: u64, prior: Option<&Twist>) -> Vec<Twist> {
-        let count = trials(self.options.confidence, self.options.outliers, 3);
+        let count = subsets_needed(self.options.confidence, self.options.outliers, 3);
         let subsets = random_subsets::<3>(self.pairs.len(), count, self.options.seed.wrapping_add(round));
         let alignment = |subset: [usize; 3]| {
-            let moments = Moments::over(subset.iter().map(|&i| (&self.pairs[i], 1.0)));
+            let moments = Moments::of_weighted_pairs(subset.iter().map(|&i| (&self.pairs[i], 1.0)));
             Some(moments.align(Form::Rigid)?.motion()?.log())
         };
         subsets.filter_map(alignment).chain(prior.copied()).collect()
@@ -121,17 +121,17 @@ fn best(candidates: &[Twist], count: usize, sample: &[StereoTrack], rig: &Stereo
 fn concentrated(phi: &Twist, sample: &[StereoTrack], rig: &StereoRig) -> Twist {
     let mut phi = *phi;
     for _ in 0..CONCENTRATIONS {
-        let at = At::new(phi, rig);
+        let at = LinearisationPoint::new(phi, rig);
         let middle = median(&mut squares(sample, &at));
         let mut structures: Vec<Vector3<f64>> = sample.iter().map(Measurement::structure).collect();
-        let weighing = Weighing {
-            blocks: None,
-            mixture: Mixture::within(NEAR),
-            scale2: (middle / MEDIAN).max(LEAST_SCALE2),
+        let residuals = ResidualModel {
+            mixture: Mixture::within(CONCENTRATION_Q),
+            scale2: (middle / CHI2_3_P50).max(LEAST_SCALE2),
         };
-        let step = Sums::over(sample, &mut structures, &at, &weighing).whole;
-        let next = Observability::of(&step.score.information)
-            .and_then(|observability| observability.solve(&step.score.information, &step.score.score));
+        let weighing = Weighing { blocks: None, residuals };
+        let whole = FrameSums::linearised(sample, &mut structures, &at, &weighing).whole;
+        let next = Observability::of(&whole.score.information)
+            .and_then(|observability| observability.solve(&whole.score.information, &whole.score.score));
         let Ok(delta) = next else { break };
         phi = Twist::from_vector(&(phi.vector() + delta));
     }

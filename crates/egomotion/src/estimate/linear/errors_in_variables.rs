@@ -18,10 +18,29 @@ use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 
 use crate::constrain::dcce;
-use crate::estimate::certainty::blocks::{self, BlockScore, Blocks};
-use crate::estimate::{Estimate, MotionEstimate, Observability, Unsolvable};
-use crate::geometry::{Gaussian, StereoRig, Twist};
+use crate::estimate::certainty::blocks::{BlockScore, Blocks};
+use crate::estimate::certainty::covariance::covariance;
+use crate::estimate::certainty::observability::Observability;
+use crate::estimate::motion_estimate::{Estimate, MotionEstimate};
+use crate::estimate::unsolvable::Unsolvable;
+use crate::geometry::distribution::SIGMA_PER_MEDIAN_DEVIATION;
+use crate::geometry::{Gaussian, StereoRig, Twist, median};
 use crate::observe::DepthChange;
+
+/// Residuals beyond this many standard deviations are outliers: so far out that cutting takes nothing from the noise.
+const OUTLIER_SIGMAS: f64 = 4.0;
+/// Most iterations of cutting and solving; an estimate that needs more has not converged.
+const MOST_ITERATIONS: usize = 20;
+/// The iteration ends when at most one row in this many changes sides: the answer then moves by less than its noise.
+const ROWS_PER_CHANGE: usize = 10_000;
+/// A direction is determined whose information exceeds this many standard errors of what the correction takes away:
+/// more would call weak directions unobserved, less would let noise pass for information.
+const DETERMINED_SIGMAS: f64 = 2.5;
+/// Variance of what the correction leaves along an undetermined direction, in units of the squared noise: 2 of a
+/// normal number's square, and half as much again since rows two pixels apart share a pixel.
+const CORRECTION_VARIANCE: f64 = 3.0;
+/// Rows summed by one task; fixed, so that sums do not depend on the number of threads.
+const STRIP: usize = 4096;
 
 /// A row of (11) with the noise of its coefficients.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +55,7 @@ struct NoisyRow {
 }
 
 /// ∂a/∂(Z, Zx, Zy) of the row a of (11), 6×3; b is −Zt.
-fn row_by_depth(change: &DepthChange, focal_px: f64) -> SMatrix<f64, 6, 3> {
+fn row_jacobian(change: &DepthChange, focal_px: f64) -> SMatrix<f64, 6, 3> {
     let (x, y, f) = (change.x_px, change.y_px, focal_px);
     let [z, zx, zy, _] = change.depth.mean.into();
     // P = Z ray and a = (n, Z ray × n) with n = along − (0, 0, 1); `along` is in proportion to the gradient over Z.
@@ -59,7 +78,7 @@ impl NoisyRow {
         let constraint = dcce::constraint(change, focal_px, &Twist::zero()).scaled(per_disparity);
         let (a, b) = (constraint.row(), constraint.rate);
         let mut jacobian = SMatrix::<f64, 7, 4>::zeros();
-        jacobian.fixed_view_mut::<6, 3>(0, 0).copy_from(&row_by_depth(change, focal_px));
+        jacobian.fixed_view_mut::<6, 3>(0, 0).copy_from(&row_jacobian(change, focal_px));
         jacobian[(6, 3)] = -1.0;
         let noise = jacobian * change.depth.cov * jacobian.transpose() * (per_disparity * per_disparity);
         let finite = a.iter().chain(noise.iter()).all(|v| v.is_finite()) && b.is_finite();
@@ -68,16 +87,16 @@ impl NoisyRow {
 
     /// b − a · φ and its variance.
     fn residual(&self, phi: &Vector6<f64>) -> (f64, f64) {
-        let mut by = SMatrix::<f64, 7, 1>::zeros();
-        by.fixed_view_mut::<6, 1>(0, 0).copy_from(&-phi);
-        by[6] = 1.0;
-        (self.b - self.a.dot(phi), (by.transpose() * self.noise * by)[0])
+        let mut gradient = SMatrix::<f64, 7, 1>::zeros();
+        gradient.fixed_view_mut::<6, 1>(0, 0).copy_from(&-phi);
+        gradient[6] = 1.0;
+        (self.b - self.a.dot(phi), (gradient.transpose() * self.noise * gradient)[0])
     }
 }
 
 /// Corrected sums of some rows, and what the correction took away.
 #[derive(Debug, Clone, Copy)]
-struct Sums {
+struct CorrectedSums {
     information: Matrix6<f64>,
     moment: Vector6<f64>,
     noise: Matrix6<f64>,
@@ -87,7 +106,7 @@ struct Sums {
     used: usize,
 }
 
-impl Sums {
+impl CorrectedSums {
     fn zero() -> Self {
         let zero = Matrix6::zeros();
         Self { information: zero, moment: Vector6::zeros(), noise: zero, square: 0.0, variance: 0.0, used: 0 }
@@ -103,17 +122,6 @@ impl Sums {
         self
     }
 }
-
-/// Residuals beyond this many standard deviations are outliers: so far out that cutting takes nothing from the noise.
-const CUT: f64 = 4.0;
-/// Most iterations of cutting and solving.
-const ITERATIONS: usize = 20;
-/// The iteration ends when fewer rows than one in so many change sides.
-const SETTLED: usize = 10_000;
-/// A direction is determined whose information exceeds so many standard errors.
-const CERTAIN: f64 = 2.5;
-/// Rows summed by one task; fixed, so that sums do not depend on the number of threads.
-const STRIP: usize = 4096;
 
 /// φ from depth changes whose gradients are noisy: DCCE (12) without its bias. Outliers are judged at `start` first.
 ///
@@ -132,9 +140,9 @@ pub fn errors_in_variables(
         changes.par_iter().filter_map(|change| NoisyRow::of(change, rig.focal_px, blocks)).collect();
     let mut phi = start.vector();
     let mut used = 0;
-    for _ in 0..ITERATIONS {
+    for _ in 0..MOST_ITERATIONS {
         let by_block = sums(&rows, &phi, blocks);
-        let whole = by_block.iter().fold(Sums::zero(), Sums::merged);
+        let whole = by_block.iter().fold(CorrectedSums::zero(), CorrectedSums::merged);
         if whole.used < 6 {
             return Err(Unsolvable::FewRows { rows: whole.used, needed: 6 });
         }
@@ -142,7 +150,7 @@ pub fn errors_in_variables(
         let last = phi;
         phi = observability.solve(&whole.information, &whole.moment)?;
         // Without anything left to cut the first answer is the last.
-        if whole.used.abs_diff(used) <= rows.len() / SETTLED || phi == last {
+        if whole.used.abs_diff(used) <= rows.len() / ROWS_PER_CHANGE || phi == last {
             return Ok(estimate(&phi, &by_block, &whole, observability, rows.len()));
         }
         used = whole.used;
@@ -157,24 +165,24 @@ fn scale(rows: &[NoisyRow], phi: &Vector6<f64>) -> f64 {
         (variance > 0.0).then(|| e.abs() / variance.sqrt())
     };
     let mut all: Vec<f64> = rows.par_iter().filter_map(standard).collect();
-    1.4826 * crate::estimate::median(&mut all)
+    SIGMA_PER_MEDIAN_DEVIATION * median(&mut all)
 }
 
 /// The sums of every block over the rows that are no outliers at φ.
-fn sums(rows: &[NoisyRow], phi: &Vector6<f64>, blocks: &Blocks) -> Vec<Sums> {
+fn sums(rows: &[NoisyRow], phi: &Vector6<f64>, blocks: &Blocks) -> Vec<CorrectedSums> {
     // A start far off makes all residuals large; then the median tells what is usual.
-    let cut = (CUT * scale(rows, phi).max(1.0)).powi(2);
-    let strips: Vec<Vec<(usize, Sums)>> = rows
+    let cut = (OUTLIER_SIGMAS * scale(rows, phi).max(1.0)).powi(2);
+    let strips: Vec<Vec<(usize, CorrectedSums)>> = rows
         .par_chunks(STRIP)
         .map(|strip| {
-            let mut runs: Vec<(usize, Sums)> = Vec::new();
+            let mut runs: Vec<(usize, CorrectedSums)> = Vec::new();
             for row in strip {
                 let (e, variance) = row.residual(phi);
                 if e * e > cut * variance {
                     continue;
                 }
                 if runs.last().is_none_or(|run| run.0 != row.block) {
-                    runs.push((row.block, Sums::zero()));
+                    runs.push((row.block, CorrectedSums::zero()));
                 }
                 let Some((_, sums)) = runs.last_mut() else { continue };
                 let noise: Matrix6<f64> = row.noise.fixed_view::<6, 6>(0, 0).into();
@@ -188,7 +196,7 @@ fn sums(rows: &[NoisyRow], phi: &Vector6<f64>, blocks: &Blocks) -> Vec<Sums> {
             runs
         })
         .collect();
-    let mut by_block = vec![Sums::zero(); blocks.count()];
+    let mut by_block = vec![CorrectedSums::zero(); blocks.count()];
     for (block, part) in strips.iter().flatten() {
         by_block[*block] = by_block[*block].merged(part);
     }
@@ -197,34 +205,34 @@ fn sums(rows: &[NoisyRow], phi: &Vector6<f64>, blocks: &Blocks) -> Vec<Sums> {
 
 /// Eigen-analysis of the corrected information, tested against the scatter of its correction.
 ///
-/// Along a direction that is not determined a row adds the square of a normal number less its variance v: a number of
-/// variance 2 v², and half again as much since rows two pixels apart share a pixel.
-fn determined(by_block: &[Sums], whole: &Sums) -> Result<Observability, Unsolvable> {
+/// Along a direction that is not determined a row adds the square of a normal number less its variance v, which
+/// scatters by [`CORRECTION_VARIANCE`] v².
+fn determined(by_block: &[CorrectedSums], whole: &CorrectedSums) -> Result<Observability, Unsolvable> {
     Observability::beyond_noise(&whole.information, &whole.noise, |direction: &Vector6<f64>| {
-        let scatter = |sums: &Sums| {
+        let scatter = |sums: &CorrectedSums| {
             let noise = direction.dot(&(sums.noise * direction));
-            3.0 * noise * noise / sums.used.max(1) as f64
+            CORRECTION_VARIANCE * noise * noise / sums.used.max(1) as f64
         };
-        CERTAIN * by_block.iter().map(scatter).sum::<f64>().sqrt()
+        DETERMINED_SIGMAS * by_block.iter().map(scatter).sum::<f64>().sqrt()
     })
 }
 
 fn estimate(
     phi: &Vector6<f64>,
-    by_block: &[Sums],
-    whole: &Sums,
+    by_block: &[CorrectedSums],
+    whole: &CorrectedSums,
     observability: Observability,
     rows: usize,
 ) -> MotionEstimate {
-    let score = |sums: &Sums| BlockScore {
+    let score = |sums: &CorrectedSums| BlockScore {
         information: sums.information,
         score: sums.moment - sums.information * phi,
     };
     let scores: Vec<BlockScore<6>> = by_block.iter().filter(|sums| sums.used > 0).map(score).collect();
     Estimate {
         theta: Gaussian {
-            mean: observability.known(phi),
-            cov: blocks::covariance(&scores, None, &observability),
+            mean: observability.with_unobserved_zero(phi),
+            cov: covariance(&scores, None, &observability),
         },
         observed: observability.observed(),
         undetermined: observability.undetermined(),
@@ -253,7 +261,7 @@ mod tests {
         for k in 0..3 {
             let step = Vector4::ith(k, 1e-6);
             let numeric = (row(at + step) - row(at - step)) / 2e-6;
-            assert!((numeric - row_by_depth(&change(at), 400.0).column(k)).amax() < 1e-7, "{k}");
+            assert!((numeric - row_jacobian(&change(at), 400.0).column(k)).amax() < 1e-7, "{k}");
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Least squares, equation (57).
 
-use crate::estimate::{Fit, NormalEquations, Row, Unsolvable};
+use super::fit::LinearFit;
+use super::row::{NormalEquations, Row};
+use crate::estimate::unsolvable::Unsolvable;
 
 /// How much each row counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,12 +27,16 @@ impl Weighting {
 ///
 /// # Errors
 /// [`Unsolvable`] with too few rows or without any determined direction.
-pub fn least_squares<const N: usize>(rows: &[Row<N>], weighting: Weighting) -> Result<Fit<N>, Unsolvable> {
+pub fn least_squares<const N: usize>(
+    rows: &[Row<N>],
+    weighting: Weighting,
+) -> Result<LinearFit<N>, Unsolvable> {
     let weights: Vec<f64> = rows.iter().map(|row| weighting.of(row)).collect();
-    let (theta, observability) = NormalEquations::over(rows.iter().zip(weights.iter().copied())).solve()?;
+    let (theta, observability) =
+        NormalEquations::of_weighted_rows(rows.iter().zip(weights.iter().copied())).solve()?;
     let square: f64 = rows.iter().zip(&weights).map(|(row, w)| w * row.residual(&theta).powi(2)).sum();
     let freedom = rows.len().saturating_sub(N).max(1) as f64;
-    Ok(Fit {
+    Ok(LinearFit {
         theta,
         weights,
         observability,

@@ -2,15 +2,25 @@
 
 use documented::DocumentedFields;
 use nalgebra::SVector;
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::linear::least_squares::{Weighting, least_squares};
-use crate::estimate::linear::median_search::{STRIP, square};
-pub use crate::estimate::linear::median_search::{Search, plain_search, search};
-use crate::estimate::{Fit, NormalEquations, Row, Unsolvable, median};
+use super::best_subset::{BestSubset, STRIP, best_subset, square};
+use super::fit::LinearFit;
+use super::least_squares::{Weighting, least_squares};
+use super::row::{NormalEquations, Row};
+use crate::estimate::random_subsets::{random_subsets, subsets_needed};
+use crate::estimate::unsolvable::Unsolvable;
+use crate::geometry::distribution::SIGMA_PER_MEDIAN_DEVIATION;
+use crate::geometry::median;
+
+/// Right-hand sides were rounded when more than this share of them is exactly zero: a continuous measurement never is.
+const ROUNDED_ZERO_SHARE: f64 = 0.05;
+/// Refits end when no unknown moves by more than this share of its standard deviation.
+const REFIT_TOLERANCE: f64 = 1e-3;
+/// Least squared residual that makes an outlier: residuals of an exact fit are rounding errors, and a scale of zero
+/// must not reject them all.
+const LEAST_CUT2: f64 = 1e-24;
 
 /// How least median of squares searches and refits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
@@ -34,41 +44,11 @@ impl Default for LmedsOptions {
     }
 }
 
-/// Number of random p-subsets of which, with probability P, one is free of a share ε of outliers, (59).
-pub fn trials(confidence: f64, outliers: f64, subset: u32) -> usize {
-    let clean = (1.0 - outliers).powi(subset as i32);
-    if clean >= 1.0 {
-        return 1;
-    }
-    let exact = (1.0 - confidence).ln() / (1.0 - clean).ln();
-    // P = .99, ε = .1, p = 1 is exactly 2; rounding errors must not make it 3.
-    (exact * (1.0 - 1e-12)).ceil().max(1.0) as usize
-}
-
-/// `count` random subsets of N different indices below `rows`.
-pub fn random_subsets<const N: usize>(
-    rows: usize,
-    count: usize,
-    seed: u64,
-) -> impl Iterator<Item = [usize; N]> {
-    let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    (0..if rows < N { 0 } else { count }).map(move |_| {
-        let mut subset = [usize::MAX; N];
-        let mut filled = 0;
-        while filled < N {
-            let candidate = rng.random_range(0..rows);
-            if !subset[..filled].contains(&candidate) {
-                subset[filled] = candidate;
-                filled += 1;
-            }
-        }
-        subset
-    })
-}
-
 /// Robust standard deviation from the median of squared residuals, 1.4826 (1 + 5/(n − p)) √median.
 pub fn robust_scale(median_square: f64, rows: usize, unknowns: usize) -> f64 {
-    1.4826 * (1.0 + 5.0 / rows.saturating_sub(unknowns).max(1) as f64) * median_square.sqrt()
+    SIGMA_PER_MEDIAN_DEVIATION
+        * (1.0 + 5.0 / rows.saturating_sub(unknowns).max(1) as f64)
+        * median_square.sqrt()
 }
 
 /// Search over random subsets, reject outliers by the robust scale, refit by least squares until the inliers settle.
@@ -79,14 +59,14 @@ pub fn lmeds<const N: usize>(
     rows: &[Row<N>],
     weighting: Weighting,
     options: &LmedsOptions,
-) -> Result<Fit<N>, Unsolvable> {
+) -> Result<LinearFit<N>, Unsolvable> {
     if rows.len() < N {
         return Err(Unsolvable::FewRows { rows: rows.len(), needed: N });
     }
-    let count = trials(options.confidence, options.outliers, N as u32);
-    let found = search(rows, weighting, random_subsets(rows.len(), count, options.seed))
+    let count = subsets_needed(options.confidence, options.outliers, N as u32);
+    let found = best_subset(rows, weighting, random_subsets(rows.len(), count, options.seed))
         .ok_or(Unsolvable::Unobservable)?;
-    refit(rows, weighting, &found, options)
+    refit_best_subset(rows, weighting, &found, options)
 }
 
 /// Reject rows beyond the cut of the robust scale around a found subset, then refit by least squares.
@@ -101,12 +81,12 @@ pub fn lmeds<const N: usize>(
 ///
 /// # Errors
 /// [`Unsolvable`] when the inliers determine nothing.
-pub fn refit<const N: usize>(
+pub fn refit_best_subset<const N: usize>(
     rows: &[Row<N>],
     weighting: Weighting,
-    found: &Search<N>,
+    found: &BestSubset<N>,
     options: &LmedsOptions,
-) -> Result<Fit<N>, Unsolvable> {
+) -> Result<LinearFit<N>, Unsolvable> {
     let refitting =
         Refitting { rows, weighting, options, rounded: options.reweights > 1 && are_rounded(rows) };
     let first = refitting.settle(&found.theta, found.median_square);
@@ -124,17 +104,11 @@ pub fn refit<const N: usize>(
     }
 }
 
-/// Share of right-hand sides that are exactly zero from which on they must have been rounded.
-const ROUNDED: f64 = 0.05;
-
-/// Whether right-hand sides were rounded: a continuous measurement is never exactly zero.
+/// Whether right-hand sides were rounded.
 fn are_rounded<const N: usize>(rows: &[Row<N>]) -> bool {
     let zeros = rows.iter().filter(|row| row.b == 0.0).count();
-    zeros as f64 > ROUNDED * rows.len() as f64
+    zeros as f64 > ROUNDED_ZERO_SHARE * rows.len() as f64
 }
-
-/// The end of an iteration whose θ moves by less than this share of a standard deviation.
-const SETTLED: f64 = 1e-3;
 
 /// What refits go by.
 struct Refitting<'a, const N: usize> {
@@ -153,8 +127,7 @@ impl<const N: usize> Refitting<'_, N> {
 
     /// Weights of the rows within the cut around θ; none for the others.
     fn kept(&self, theta: &SVector<f64, N>, scale: f64) -> Vec<f64> {
-        // Residuals of an exact fit are rounding errors; a scale of zero must not reject them all.
-        let limit = (self.options.cut * scale).powi(2).max(1e-24);
+        let limit = (self.options.cut * scale).powi(2).max(LEAST_CUT2);
         let weigh = |row: &Row<N>| {
             let weight = self.weighting.of(row);
             let own = if self.rounded { weight * (self.options.cut * row.sigma).powi(2) } else { 0.0 };
@@ -164,11 +137,11 @@ impl<const N: usize> Refitting<'_, N> {
     }
 
     /// Least squares of what is kept, until that settles.
-    fn settle(&self, theta: &SVector<f64, N>, median_square: f64) -> Result<Fit<N>, Unsolvable> {
+    fn settle(&self, theta: &SVector<f64, N>, median_square: f64) -> Result<LinearFit<N>, Unsolvable> {
         let scale_of = |median_square| robust_scale(median_square, self.rows.len(), N);
         let mut scale = scale_of(median_square);
         let mut weights = self.kept(theta, scale);
-        let mut equations = NormalEquations::weighted(self.rows, &weights);
+        let mut equations = NormalEquations::in_strips(self.rows, &weights);
         let mut fit = equations.solve()?;
         for _ in 1..self.options.reweights.max(1) {
             scale = scale_of(self.median_square(&fit.0));
@@ -177,16 +150,16 @@ impl<const N: usize> Refitting<'_, N> {
                 break;
             }
             weights = next;
-            equations = NormalEquations::weighted(self.rows, &weights);
+            equations = NormalEquations::in_strips(self.rows, &weights);
             let last = std::mem::replace(&mut fit, equations.solve()?);
             let moved = (fit.0 - last.0).component_mul(&equations.information.diagonal().map(f64::sqrt));
-            if moved.amax() <= SETTLED * scale {
+            if moved.amax() <= REFIT_TOLERANCE * scale {
                 break;
             }
         }
         let (theta, observability) = fit;
         let inliers = weights.iter().filter(|&&w| w > 0.0).count();
-        Ok(Fit { theta, weights, observability, bread: None, inliers, residual_scale: scale })
+        Ok(LinearFit { theta, weights, observability, bread: None, inliers, residual_scale: scale })
     }
 
     /// Sum of squared residuals in units of σ, none counted beyond the cut.

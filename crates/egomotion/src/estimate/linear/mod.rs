@@ -1,9 +1,10 @@
-//! Fits of linear rows: least squares, least median of squares, and what weighs or corrects them.
+//! Fits of linear rows a · θ = b: least squares, least median of squares, Student's t, and the paper's two steps.
 
-pub mod errors_in_variables;
-pub mod least_squares;
-pub mod lmeds;
-pub mod m_estimator;
-pub mod median_search;
-pub mod row;
-pub mod two_step;
+pub(super) mod best_subset;
+pub(super) mod errors_in_variables;
+pub(super) mod fit;
+pub(super) mod least_squares;
+pub(super) mod lmeds;
+pub(super) mod m_estimator;
+pub(super) mod row;
+pub(super) mod two_step;

@@ -4,7 +4,11 @@ use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
 use crate::constrain::LinearConstraint;
-use crate::estimate::Unsolvable;
+use crate::estimate::certainty::observability::Observability;
+use crate::estimate::unsolvable::Unsolvable;
+
+/// Rows summed by one task; fixed, so that sums do not depend on the number of threads.
+const STRIP: usize = 16_384;
 
 /// One equation a · θ = b ± σ of a linear regression in N unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,7 +19,7 @@ pub struct Row<const N: usize> {
     pub b: f64,
     /// Standard deviation of b − a · θ.
     pub sigma: f64,
-    /// Which block of neighbouring pixels the row comes from; see [`crate::estimate::certainty::blocks::Blocks`].
+    /// Which block of neighbouring pixels the row comes from; see [`crate::estimate::Blocks`].
     pub block: usize,
 }
 
@@ -52,7 +56,7 @@ impl<const N: usize> Default for NormalEquations<N> {
 
 impl<const N: usize> NormalEquations<N> {
     /// Sums over weighted rows.
-    pub fn over<'a>(rows: impl IntoIterator<Item = (&'a Row<N>, f64)>) -> Self {
+    pub fn of_weighted_rows<'a>(rows: impl IntoIterator<Item = (&'a Row<N>, f64)>) -> Self {
         let mut sums = Self::default();
         for (row, weight) in rows {
             if weight > 0.0 {
@@ -65,11 +69,11 @@ impl<const N: usize> NormalEquations<N> {
     }
 
     /// Sums over rows with their weights, in fixed strips: the same whatever the number of threads.
-    pub fn weighted(rows: &[Row<N>], weights: &[f64]) -> Self {
-        const STRIP: usize = 16_384;
+    pub(crate) fn in_strips(rows: &[Row<N>], weights: &[f64]) -> Self {
+        debug_assert_eq!(rows.len(), weights.len(), "each row has one weight");
         let strips = rows.par_chunks(STRIP).zip(weights.par_chunks(STRIP));
         let parts: Vec<Self> =
-            strips.map(|(rows, w)| Self::over(rows.iter().zip(w.iter().copied()))).collect();
+            strips.map(|(rows, w)| Self::of_weighted_rows(rows.iter().zip(w.iter().copied()))).collect();
         parts.iter().fold(Self::default(), |sum, part| Self {
             information: sum.information + part.information,
             moment: sum.moment + part.moment,
@@ -81,11 +85,11 @@ impl<const N: usize> NormalEquations<N> {
     ///
     /// # Errors
     /// [`Unsolvable::FewRows`] with fewer rows than unknowns, [`Unsolvable::NotFinite`] on NaN.
-    pub fn solve(&self) -> Result<(SVector<f64, N>, crate::estimate::Observability), Unsolvable> {
+    pub fn solve(&self) -> Result<(SVector<f64, N>, Observability), Unsolvable> {
         if self.rows < N {
             return Err(Unsolvable::FewRows { rows: self.rows, needed: N });
         }
-        let observability = crate::estimate::Observability::of(&self.information)?;
+        let observability = Observability::of(&self.information)?;
         Ok((observability.solve(&self.information, &self.moment)?, observability))
     }
 }

@@ -2,8 +2,13 @@
 
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-use crate::estimate::certainty::blocks::{self, BlockScore};
-use crate::estimate::{Estimate, Fit, MotionEstimate, Observability, Row, Unsolvable};
+use super::fit::LinearFit;
+use super::row::Row;
+use crate::estimate::certainty::blocks::BlockScore;
+use crate::estimate::certainty::covariance::{covariance, with_unobserved};
+use crate::estimate::certainty::observability::Observability;
+use crate::estimate::motion_estimate::{Estimate, MotionEstimate};
+use crate::estimate::unsolvable::Unsolvable;
 use crate::geometry::Gaussian;
 
 /// Places of (tZ, ΩX, ΩY) in φ: what binocular flow determines.
@@ -26,7 +31,7 @@ fn part(v: &Vector6<f64>, places: [usize; 3]) -> Vector3<f64> {
 pub fn two_step(
     dv: &[Row<6>],
     flow: &[Row<6>],
-    solve: impl Fn(&[Row<3>]) -> Result<Fit<3>, Unsolvable>,
+    solve: impl Fn(&[Row<3>]) -> Result<LinearFit<3>, Unsolvable>,
 ) -> Result<MotionEstimate, Unsolvable> {
     let first_rows: Vec<Row<3>> =
         dv.iter().map(|r| Row { a: part(&r.a, FIRST), b: r.b, sigma: r.sigma, block: r.block }).collect();
@@ -56,7 +61,7 @@ pub fn two_step(
     if first.observability.rank() < 3 {
         SECOND.into_iter().for_each(|i| observed[i] = false);
         undetermined = undetermined.with_components(SECOND);
-        cov = blocks::with_unknowns(cov, &observed);
+        cov = with_unobserved(cov, &observed);
     }
     for i in (0..6).filter(|&i| !observed[i]) {
         mean[i] = 0.0;
@@ -75,7 +80,7 @@ pub fn two_step(
 ///
 /// The first step's rows may be in 1/m and the second's in pixels: without it neither scatter could be
 /// compared with the other, as shrinkage does.
-fn unit_of_score(fit: &Fit<3>) -> f64 {
+fn unit_of_score(fit: &LinearFit<3>) -> f64 {
     let unit = fit.residual_scale.powi(-2);
     if unit.is_finite() && unit > 0.0 { unit } else { 1.0 }
 }
@@ -91,7 +96,7 @@ impl StackedSystem {
         Self { scores: vec![BlockScore::default(); blocks], bread: Matrix6::zeros() }
     }
 
-    fn add(&mut self, rows: &[Row<3>], fit: &Fit<3>, places: [usize; 3]) {
+    fn add(&mut self, rows: &[Row<3>], fit: &LinearFit<3>, places: [usize; 3]) {
         let mut information = Matrix3::zeros();
         let unit = unit_of_score(fit);
         for (row, &weight) in rows.iter().zip(&fit.weights) {
@@ -116,7 +121,7 @@ impl StackedSystem {
     }
 
     /// How the second step's score changes with the first step's answer.
-    fn couple(&mut self, flow: &[Row<6>], second: &Fit<3>) {
+    fn couple(&mut self, flow: &[Row<6>], second: &LinearFit<3>) {
         let unit = unit_of_score(second);
         let (mut coupling, mut information) = (Matrix3::zeros(), Matrix3::zeros());
         for (row, &weight) in flow.iter().zip(&second.weights) {
@@ -141,6 +146,6 @@ impl StackedSystem {
         let total: Matrix6<f64> = self.scores.iter().map(|block| block.information).sum();
         let observability = Observability::of(&total)?;
         let inverse = self.bread.try_inverse();
-        Ok((blocks::covariance(&self.scores, inverse.as_ref(), &observability), observability))
+        Ok((covariance(&self.scores, inverse.as_ref(), &observability), observability))
     }
 }

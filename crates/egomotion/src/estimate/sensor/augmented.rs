@@ -1,34 +1,36 @@
-//! φ and the sensor's errors at once: one Gauss–Newton step, and the covariance of φ that includes them.
+//! φ and the sensor's errors estimated together: one Gauss–Newton step, and the covariance of φ that includes them.
 //!
 //! The errors u, in units of their prior standard deviations, join φ as unknowns: with Y = (G, X) and the prior
 //! u ~ N(0, 1), (Σ w Yᵀ S⁻¹ Y + D diag(0, 1)) δ = Σ w Yᵀ S⁻¹ e − D (0, u). Observations near each other share their noise
 //! and say less than their number; D, by how much the scatter of the blocks' scores exceeds what independent rows
 //! would have, keeps them from overruling the prior (the adjustment of composite likelihoods). The covariance is the
-//! sandwich of [`crate::estimate::certainty::blocks`] with the errors eliminated from each block's score, and the prior's own part.
+//! sandwich of [`crate::estimate::certainty::covariance`] with the errors eliminated from each block's score, and the prior's own part.
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use rayon::prelude::*;
 
-use crate::estimate::Observability;
-use crate::estimate::certainty::blocks::{self, BlockScore, Blocks};
+use super::errors::{CALIBRATION, ERRORS, SensedTrack, SensorErrors, TrackSource};
+use super::tolerance::SensorPrior;
+use crate::constrain::{LinearisationPoint, Measurement};
+use crate::estimate::certainty::blocks::{BlockScore, Blocks};
+use crate::estimate::certainty::covariance::covariance;
+use crate::estimate::certainty::observability::Observability;
 use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihood;
-use crate::estimate::likelihood::mixture::Mixture;
-use crate::estimate::measurement::{At, Measurement};
-use crate::estimate::sensor::tolerance::{
-    CALIBRATION, ERRORS, SensedTrack, SensorErrors, SensorPrior, TrackSource,
-};
+use crate::estimate::likelihood::mixture::ResidualModel;
 use crate::geometry::StereoRig;
 use crate::geometry::gaussian::product;
 use crate::observe::StereoTrack;
 
-/// φ and errors.
+/// Number of all unknowns: φ and the errors.
 const ALL: usize = 6 + ERRORS;
+/// Number of the unknowns of which all observations speak: the motion of the scene and the calibration.
+const BASE: usize = 6 + CALIBRATION;
 /// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
 const STRIP: usize = 512;
 
 /// What one step towards the most likely motion and errors says.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Joint {
+pub(crate) struct AugmentedStep {
     /// By how much φ moves.
     pub step: Vector6<f64>,
     /// The errors after the step.
@@ -39,67 +41,62 @@ pub struct Joint {
 
 /// Step from what was `found` of `observations` from which `errors` are taken already; `None` where some direction of
 /// motion is not determined.
-pub fn augmented_step(
+pub(crate) fn augmented_step(
     observations: &[SensedTrack],
     rig: &StereoRig,
     found: &MaximumLikelihood,
     errors: &SensorErrors,
     prior: &SensorPrior,
     blocks: &Blocks,
-) -> Option<Joint> {
-    let at = At::new(found.motion.phi(), rig);
-    let weighing = Weighing { mixture: found.mixture, scale2: found.scale2, blocks };
-    let by_block: Vec<Sums> =
-        Raw::by_block(observations, &at, &weighing).iter().map(|m| m.sums(&at, prior)).collect();
+) -> Option<AugmentedStep> {
+    let at = LinearisationPoint::new(found.motion.phi(), rig);
+    let sums = AugmentedSums::by_block(observations, &at, blocks, &found.residuals);
+    let by_block: Vec<AugmentedScore> = sums.iter().map(|sums| sums.score(&at, prior)).collect();
     let unit = prior.sigma.map(|sigma| if sigma > 0.0 { sigma.recip() } else { 0.0 });
-    let solved = Solved::of(&by_block, &errors.vector().component_mul(&unit))?;
+    let solved = AugmentedSolution::of(&by_block, &errors.vector().component_mul(&unit))?;
     let moved = errors.vector() + solved.step.fixed_rows::<ERRORS>(6).component_mul(&prior.sigma);
-    Some(Joint {
+    Some(AugmentedStep {
         step: solved.step.fixed_rows::<6>(0).into(),
         errors: SensorErrors::from_vector(&moved),
         cov: solved.covariance(&by_block)?,
     })
 }
 
-struct Weighing<'a> {
-    mixture: Mixture,
-    scale2: f64,
-    blocks: &'a Blocks,
-}
-
-/// The motion of the scene and the calibration, of which all observations speak.
-const BASE: usize = 6 + CALIBRATION;
-
 /// One observation at the estimate.
 struct Weighed {
     /// −∂e of all unknowns.
-    by_all: SMatrix<f64, 3, ALL>,
+    jacobian: SMatrix<f64, 3, ALL>,
     inverse_cov: Matrix3<f64>,
     misclosure: Vector3<f64>,
     /// By how much its weight changes with its misclosure, relative to the weight.
     reweighting: f64,
 }
 
-/// Sums over the observations of a block, by φ's small motion and by the errors in their own units.
+/// AugmentedScore over the observations of a block, by φ's small motion and by the errors in their own units.
 #[derive(Debug, Clone, Copy)]
-struct Raw {
+struct AugmentedSums {
     information: SMatrix<f64, ALL, ALL>,
     /// By how much the score's derivative is less than the information, because weights change as well.
     reweighting: SMatrix<f64, ALL, ALL>,
     score: SVector<f64, ALL>,
 }
 
-impl Default for Raw {
+impl Default for AugmentedSums {
     fn default() -> Self {
         Self { information: SMatrix::zeros(), reweighting: SMatrix::zeros(), score: SVector::zeros() }
     }
 }
 
-impl Raw {
-    fn by_block(observations: &[SensedTrack], at: &At<'_>, weighing: &Weighing<'_>) -> Vec<Self> {
+impl AugmentedSums {
+    fn by_block(
+        observations: &[SensedTrack],
+        at: &LinearisationPoint<'_>,
+        blocks: &Blocks,
+        residuals: &ResidualModel,
+    ) -> Vec<Self> {
         let strips: Vec<Vec<(usize, Self)>> =
-            observations.par_chunks(STRIP).map(|strip| Self::runs(strip, at, weighing)).collect();
-        let mut by_block = vec![Self::default(); weighing.blocks.count()];
+            observations.par_chunks(STRIP).map(|strip| Self::runs(strip, at, blocks, residuals)).collect();
+        let mut by_block = vec![Self::default(); blocks.count()];
         for (block, sums) in strips.iter().flatten() {
             by_block[*block].merge(sums);
         }
@@ -107,39 +104,43 @@ impl Raw {
     }
 
     /// One for each run of observations that lie in one block.
-    fn runs(strip: &[SensedTrack], at: &At<'_>, weighing: &Weighing<'_>) -> Vec<(usize, Self)> {
+    fn runs(
+        strip: &[SensedTrack],
+        at: &LinearisationPoint<'_>,
+        blocks: &Blocks,
+        residuals: &ResidualModel,
+    ) -> Vec<(usize, Self)> {
         let mut runs: Vec<(usize, Self)> = Vec::new();
         for sensed in strip {
             let (x, y) = sensed.track.position();
-            let block = weighing.blocks.index(x, y);
+            let block = blocks.index(x, y);
             if runs.last().is_none_or(|(last, _)| *last != block) {
                 runs.push((block, Self::default()));
             }
             if let Some((_, sums)) = runs.last_mut() {
-                sums.add(sensed, at, weighing);
+                sums.add(sensed, at, residuals);
             }
         }
         runs
     }
 
-    fn add(&mut self, sensed: &SensedTrack, at: &At<'_>, weighing: &Weighing<'_>) {
+    fn add(&mut self, sensed: &SensedTrack, at: &LinearisationPoint<'_>, residuals: &ResidualModel) {
         // Once to move the structure to where it settles.
         let mut structure: Vector3<f64> = sensed.track.structure();
         let _measured = sensed.track.linearise(&mut structure, at);
         let settled = structure;
         let Some(l) = sensed.track.linearise(&mut structure, at) else { return };
-        let Some(by_calibration) = sensed.by_calibration(&settled, at) else { return };
-        let mut by_all = SMatrix::<f64, 3, ALL>::zeros();
-        by_all.fixed_columns_mut::<6>(0).copy_from(&l.by_motion);
-        by_all.fixed_columns_mut::<CALIBRATION>(6).copy_from(&by_calibration);
-        let by_excess = sensed.by_excess(&l.by_motion, at.rig());
-        by_all.fixed_columns_mut::<{ ERRORS - CALIBRATION }>(BASE).copy_from(&by_excess);
-        let inverse_cov = l.inverse_cov / weighing.scale2;
-        let q = l.misclosure.dot(&product(&inverse_cov, &l.misclosure));
-        let (weight, slope) = weighing.mixture.weight(q);
+        let Some(calibration_jacobian) = sensed.calibration_jacobian(&settled, at) else { return };
+        let mut jacobian = SMatrix::<f64, 3, ALL>::zeros();
+        jacobian.fixed_columns_mut::<6>(0).copy_from(&l.motion_jacobian);
+        jacobian.fixed_columns_mut::<CALIBRATION>(6).copy_from(&calibration_jacobian);
+        let excess_jacobian = sensed.excess_jacobian(&l.motion_jacobian, at.rig());
+        jacobian.fixed_columns_mut::<{ ERRORS - CALIBRATION }>(BASE).copy_from(&excess_jacobian);
+        let inverse_cov = l.inverse_cov / residuals.scale2;
+        let q = l.e.dot(&product(&inverse_cov, &l.e));
+        let (weight, slope) = residuals.mixture.weight(q);
         let reweighting = slope / weight.max(f64::MIN_POSITIVE);
-        let one =
-            Weighed { by_all, inverse_cov: inverse_cov * weight, misclosure: l.misclosure, reweighting };
+        let one = Weighed { jacobian, inverse_cov: inverse_cov * weight, misclosure: l.e, reweighting };
         // Of the errors of other parts of the sensor the derivatives are zero.
         match sensed.source {
             TrackSource::Stereo => self.add_columns::<BASE>(&one, |i| i),
@@ -153,7 +154,7 @@ impl Raw {
     /// Add what an observation says of K of the unknowns, of which the i-th is `place(i)`.
     #[inline(always)]
     fn add_columns<const K: usize>(&mut self, one: &Weighed, place: impl Fn(usize) -> usize) {
-        let by = SMatrix::<f64, 3, K>::from_fn(|r, i| one.by_all[(r, place(i))]);
+        let by = SMatrix::<f64, 3, K>::from_fn(|r, i| one.jacobian[(r, place(i))]);
         let weighted = product(&by.transpose(), &one.inverse_cov);
         let (information, score) = (product(&weighted, &by), product(&weighted, &one.misclosure));
         for j in 0..K {
@@ -172,30 +173,30 @@ impl Raw {
         self.score += other.score;
     }
 
-    /// Sums by φ and by the errors in units of their prior standard deviations.
-    fn sums(&self, at: &At<'_>, prior: &SensorPrior) -> Sums {
+    /// AugmentedScore by φ and by the errors in units of their prior standard deviations.
+    fn score(&self, at: &LinearisationPoint<'_>, prior: &SensorPrior) -> AugmentedScore {
         let mut units = SMatrix::<f64, ALL, ALL>::identity();
-        units.fixed_view_mut::<6, 6>(0, 0).copy_from(&StereoTrack::by_phi(at));
+        units.fixed_view_mut::<6, 6>(0, 0).copy_from(&StereoTrack::small_motion_jacobian(at));
         for (k, sigma) in prior.sigma.iter().enumerate() {
             units[(6 + k, 6 + k)] = *sigma;
         }
         let across = units.transpose();
-        Sums {
+        AugmentedScore {
             score: BlockScore { information: across * self.information * units, score: across * self.score },
             reweighting: across * self.reweighting * units,
         }
     }
 }
 
-/// Sums over the observations of a block, by all unknowns.
+/// AugmentedScore over the observations of a block, by all unknowns.
 #[derive(Debug, Clone, Copy)]
-struct Sums {
+struct AugmentedScore {
     score: BlockScore<ALL>,
     reweighting: SMatrix<f64, ALL, ALL>,
 }
 
 /// The system of all unknowns, solved.
-struct Solved {
+struct AugmentedSolution {
     step: SVector<f64, ALL>,
     /// Inverse derivative of the total score, with the prior.
     inverse: SMatrix<f64, ALL, ALL>,
@@ -203,8 +204,8 @@ struct Solved {
     design_effect: f64,
 }
 
-impl Solved {
-    fn of(by_block: &[Sums], errors: &SVector<f64, ERRORS>) -> Option<Self> {
+impl AugmentedSolution {
+    fn of(by_block: &[AugmentedScore], errors: &SVector<f64, ERRORS>) -> Option<Self> {
         let information: SMatrix<f64, ALL, ALL> = by_block.iter().map(|b| b.score.information).sum();
         let score: SVector<f64, ALL> = by_block.iter().map(|b| b.score.score).sum();
         let reweighting: SMatrix<f64, ALL, ALL> = by_block.iter().map(|b| b.reweighting).sum();
@@ -222,7 +223,7 @@ impl Solved {
     }
 
     /// Of φ: what the blocks' scatter makes of it, and what the prior leaves open.
-    fn covariance(&self, by_block: &[Sums]) -> Option<Matrix6<f64>> {
+    fn covariance(&self, by_block: &[AugmentedScore]) -> Option<Matrix6<f64>> {
         let of_phi: Matrix6<f64> = self.inverse.fixed_view::<6, 6>(0, 0).into();
         let across: SMatrix<f64, 6, ERRORS> = self.inverse.fixed_view::<6, ERRORS>(0, 6).into();
         // Eliminates the errors from a score.
@@ -238,21 +239,21 @@ impl Solved {
             .collect();
         let total: Matrix6<f64> = scores.iter().map(|block| block.information).sum();
         let observability = Observability::of(&total).ok()?;
-        let cov = blocks::covariance(&scores, Some(&of_phi), &observability);
+        let cov = covariance(&scores, Some(&of_phi), &observability);
         let cov = cov + self.design_effect.powi(2) * across * across.transpose();
         cov.iter().all(|v| v.is_finite()).then_some(cov)
     }
 }
 
 /// tr(A⁻¹ M)/6 of φ, where A is the information and M the sum of the blocks' squared scores; at least 1.
-fn design_effect(by_block: &[Sums], information: &SMatrix<f64, ALL, ALL>) -> Option<f64> {
+fn design_effect(by_block: &[AugmentedScore], information: &SMatrix<f64, ALL, ALL>) -> Option<f64> {
     let of_phi: Matrix6<f64> = information.fixed_view::<6, 6>(0, 0).into();
     let observability = Observability::of(&of_phi).ok()?;
     if observability.rank() < 6 {
         return None;
     }
     let of_phi = of_phi.cholesky()?;
-    let square = |sums: &Sums| {
+    let square = |sums: &AugmentedScore| {
         let score: Vector6<f64> = sums.score.score.fixed_rows::<6>(0).into();
         score.dot(&of_phi.solve(&score))
     };

@@ -1,5 +1,5 @@
-//! Errors that all observations of a sensor share, and their part in the covariance.
+//! Errors of a sensor that is known only so well: their prior, what they do, and their estimate together with φ.
 
-pub mod augmented;
-pub mod systematic;
-pub mod tolerance;
+pub(super) mod augmented;
+pub(super) mod errors;
+pub(super) mod tolerance;

@@ -1,17 +1,18 @@
-//! What is known of a sensor only so well: errors that all its observations share, estimated along with φ.
-//!
-//! No number of pixels averages out a wrong focal length, nor an image whose last row is taken after its first
-//! while the camera turns ever faster. Each such error is a parameter with mean zero and the standard deviation
-//! that the [`Tolerance`] states; observations may tell more of it ([`crate::estimate::sensor::augmented`]). What an error does to an
-//! observation is undone by [`SensorErrors::corrected`].
+//! How well a sensor is known, and the prior that this makes of its errors over an interval.
 
 use documented::DocumentedFields;
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::estimate::measurement::{At, led};
-use crate::geometry::{Gaussian, StereoRig, Twist};
-use crate::observe::StereoTrack;
+use super::errors::{ERRORS, SensorErrors};
+use crate::geometry::Twist;
+
+/// Standard deviation of the linear acceleration of a camera that is held in a hand, in m/s²: walking hands accelerate
+/// by some m/s².
+pub const HAND_ACCELERATION_M_S2: f64 = 2.0;
+/// Standard deviation of the angular acceleration of a camera that is held in a hand, in rad/s²: a wrist that turns to
+/// and fro twice a second by 5° accelerates by up to 14 rad/s².
+pub const HAND_ACCELERATION_RAD_S2: f64 = 5.0;
 
 /// How well a sensor is known: standard deviations; 0 is exact.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, DocumentedFields)]
@@ -29,17 +30,6 @@ pub struct Tolerance {
     pub delay_s: f64,
 }
 
-/// Standard deviation of the acceleration of a camera that is held in a hand, in m/s² and rad/s².
-///
-/// Walking hands accelerate by some m/s²; a wrist that turns to and fro twice a second by 5° accelerates by up to 14 rad/s².
-pub const ACCELERATION: (f64, f64) = (2.0, 5.0);
-
-/// Errors that a [`Tolerance`] allows: focal length, principal point (2), scale, motion during read-out (6), motion
-/// between image and depth (6).
-pub(crate) const ERRORS: usize = 16;
-/// The first four of them.
-pub(crate) const CALIBRATION: usize = 4;
-
 impl Tolerance {
     /// Whether nothing is allowed for.
     pub fn is_exact(&self) -> bool {
@@ -47,7 +37,7 @@ impl Tolerance {
     }
 
     /// Whether each number is one that a standard deviation can be.
-    pub fn is_valid(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         let Self { focal, centre_px, scale, readout_s, delay_s } = *self;
         [focal, centre_px, scale, readout_s, delay_s].iter().all(|sigma| sigma.is_finite() && *sigma >= 0.0)
     }
@@ -60,10 +50,11 @@ impl Tolerance {
         Self { focal: 1.5e-3, centre_px: 0.3, scale: 5e-4, ..Self::default() }
     }
 
-    /// Standard deviations of the errors of a pair of frames that are `dt_s` apart.
-    pub fn over(&self, dt_s: f64) -> SensorPrior {
-        let [during, apart] = [self.readout_s, self.delay_s]
-            .map(|seconds| [ACCELERATION.0 * seconds * dt_s, ACCELERATION.1 * seconds * dt_s]);
+    /// The prior of the errors of a pair of frames that are `dt_s` seconds apart.
+    pub(crate) fn prior_over(&self, dt_s: f64) -> SensorPrior {
+        let [during, apart] = [self.readout_s, self.delay_s].map(|seconds| {
+            [HAND_ACCELERATION_M_S2 * seconds * dt_s, HAND_ACCELERATION_RAD_S2 * seconds * dt_s]
+        });
         let moving = |[t, omega]: [f64; 2]| Twist { t: Vector3::repeat(t), omega: Vector3::repeat(omega) };
         let sigma = SensorErrors {
             focal: self.focal,
@@ -78,220 +69,26 @@ impl Tolerance {
 
 /// Standard deviations of the errors before anything is observed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SensorPrior {
+pub(crate) struct SensorPrior {
     pub(crate) sigma: SVector<f64, ERRORS>,
 }
 
 impl SensorPrior {
     /// Whether nothing is allowed for.
-    pub fn is_exact(&self) -> bool {
+    pub(crate) fn is_exact(&self) -> bool {
         self.sigma.amax() == 0.0
-    }
-}
-
-/// What made an observation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TrackSource {
-    /// The two cameras of a rig.
-    Stereo,
-    /// The image of a depth camera, with disparity read from its depth image.
-    Image,
-    /// Its depth image alone.
-    Depth,
-}
-
-/// A track, and what made it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SensedTrack {
-    /// The track.
-    pub track: StereoTrack,
-    /// What made it.
-    pub source: TrackSource,
-}
-
-/// Values of the errors.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SensorErrors {
-    /// Relative error of the focal length.
-    pub focal: f64,
-    /// Error of the principal point, in pixels.
-    pub centre_px: (f64, f64),
-    /// Relative error of depth.
-    pub scale: f64,
-    /// By how much the motion that the image's last row sees exceeds that of its first.
-    pub during: Twist,
-    /// By how much the motion that depth images see exceeds that of images.
-    pub apart: Twist,
-}
-
-impl SensorErrors {
-    /// None.
-    pub fn none() -> Self {
-        Self::from_vector(&SVector::zeros())
-    }
-
-    pub(crate) fn from_vector(e: &SVector<f64, ERRORS>) -> Self {
-        Self {
-            focal: e[0],
-            centre_px: (e[1], e[2]),
-            scale: e[3],
-            during: Twist::from_vector(&e.fixed_rows::<6>(4).into()),
-            apart: Twist::from_vector(&e.fixed_rows::<6>(10).into()),
-        }
-    }
-
-    pub(crate) fn vector(&self) -> SVector<f64, ERRORS> {
-        let mut e = SVector::<f64, ERRORS>::zeros();
-        (e[0], e[1], e[2], e[3]) = (self.focal, self.centre_px.0, self.centre_px.1, self.scale);
-        e.fixed_rows_mut::<6>(4).copy_from(&self.during.vector());
-        e.fixed_rows_mut::<6>(10).copy_from(&self.apart.vector());
-        e
-    }
-
-    /// What a sensor without these errors would have observed.
-    pub fn corrected(&self, sensed: &SensedTrack, rig: &StereoRig) -> SensedTrack {
-        let mut track = sensed.track;
-        let focal = 1.0 + self.focal;
-        let depth = (1.0 + self.scale) * if sensed.source == TrackSource::Stereo { focal } else { 1.0 };
-        for end in [&mut track.before, &mut track.after] {
-            let [x, y, d] = end.mean.into();
-            let centred = (x - self.centre_px.0, y - self.centre_px.1 * rig.aspect());
-            end.mean = Vector3::new(centred.0 / focal, centred.1 / focal, d / depth);
-        }
-        let sensed = SensedTrack { track, ..*sensed };
-        let rolled = self.during.scaled(sensed.row(rig));
-        // Most often there is none, and it costs a projection.
-        let moved = |excess: &Twist, xyd: &Vector3<f64>| match *excess == Twist::zero() {
-            true => Some(*xyd),
-            false => rig.project(&excess.exp().apply(&rig.point(xyd)?)),
-        };
-        let after = match sensed.source {
-            TrackSource::Stereo => None,
-            TrackSource::Depth => moved(&self.apart.scaled(-1.0), &track.after.mean),
-            TrackSource::Image => moved(&rolled.scaled(-1.0), &track.after.mean)
-                .and_then(|place| Some(sensed.read_again(&place, &moved(&self.apart, &place)?))),
-        };
-        let after = Gaussian { mean: after.unwrap_or(track.after.mean), ..track.after };
-        SensedTrack { track: StereoTrack { after, ..track }, ..sensed }
-    }
-}
-
-impl SensedTrack {
-    /// Where in the image's height it begins, −½ … ½.
-    pub(crate) fn row(&self, rig: &StereoRig) -> f64 {
-        let before = &self.track.before.mean;
-        let height = rig.height_px.max(1) as f64;
-        (rig.pixel_from_image(before.x, before.y).1 + 0.5) / height - 0.5
-    }
-
-    /// The slope of the depth image's disparity along x and y around the later place, of which the covariance of the two
-    /// speaks.
-    fn slope(&self) -> Vector2<f64> {
-        let cov = &self.track.after.cov;
-        let place: Matrix2<f64> = cov.fixed_view::<2, 2>(0, 0).into();
-        place.try_inverse().map_or_else(Vector2::zeros, |inverse| inverse * Vector2::new(cov.m13, cov.m23))
-    }
-
-    /// The later end at another `place`, with the disparity that a depth image would have there in which the point were
-    /// not `apart` but at that place.
-    fn read_again(&self, place: &Vector3<f64>, apart: &Vector3<f64>) -> Vector3<f64> {
-        let after = &self.track.after.mean;
-        let d = after.z + self.slope().dot(&(apart - after).xy()) - (apart.z - place.z);
-        Vector3::new(place.x, place.y, d)
-    }
-
-    /// −∂e/∂(motion during read-out, motion apart), given that by φ.
-    pub(crate) fn by_excess(
-        &self,
-        by_motion: &SMatrix<f64, 3, 6>,
-        rig: &StereoRig,
-    ) -> SMatrix<f64, 3, { ERRORS - CALIBRATION }> {
-        let mut by_excess = SMatrix::<f64, 3, { ERRORS - CALIBRATION }>::zeros();
-        match self.source {
-            TrackSource::Stereo => {}
-            TrackSource::Image => {
-                // The image sees the place, the depth image what surface is there.
-                let slope = self.slope();
-                let along = by_motion.row(0) * slope.x + by_motion.row(1) * slope.y;
-                let mut place = *by_motion;
-                place.set_row(2, &along);
-                by_excess.fixed_columns_mut::<6>(0).copy_from(&(place * self.row(rig)));
-                by_excess.fixed_view_mut::<1, 6>(2, 6).copy_from(&(by_motion.row(2) - along));
-            }
-            TrackSource::Depth => by_excess.fixed_columns_mut::<6>(6).copy_from(by_motion),
-        }
-        by_excess
-    }
-
-    /// −∂e/∂(focal length, principal point, scale) of the misclosure e at a structure.
-    ///
-    /// At what the motion predicts, not at what was measured: that would shrink residuals by scaling them.
-    pub(crate) fn by_calibration(
-        &self,
-        structure: &Vector3<f64>,
-        at: &At<'_>,
-    ) -> Option<SMatrix<f64, 3, CALIBRATION>> {
-        let (predicted, by_structure) = led(structure, at)?;
-        let change = |after: Vector3<f64>, before: Vector3<f64>| after - by_structure * before;
-        let scaled = Vector3::new(1.0, 1.0, if self.source == TrackSource::Stereo { 1.0 } else { 0.0 });
-        let (x, y, d) = (Vector3::x(), Vector3::y() * at.rig().aspect(), Vector3::z());
-        Some(SMatrix::from_columns(&[
-            change(predicted.component_mul(&scaled), structure.component_mul(&scaled)),
-            change(x, x),
-            change(y, y),
-            change(predicted.component_mul(&d), structure.component_mul(&d)),
-        ]))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Matrix3;
-
-    use crate::estimate::measurement::Measurement;
-
-    #[test]
-    fn corrections_and_derivatives_agree() {
-        let rig = StereoRig::new(400.0, (150.0, 130.0), 0.1, (320, 240)).unwrap();
-        let rig = StereoRig { focal_y_px: 410.0, ..rig };
-        let phi = Twist { t: Vector3::new(0.03, -0.02, 0.05), omega: Vector3::new(0.01, -0.02, 0.015) };
-        let at = At::new(phi, &rig);
-        let before = Vector3::new(-60.0, 45.0, 12.0);
-        let after = rig.project(&phi.exp().apply(&rig.point(&before).unwrap())).unwrap();
-        // Disparity read at a place that is not certain, on a slanted surface.
-        let cov = Matrix3::new(0.1, 0.02, 0.006, 0.02, 0.1, -0.003, 0.006, -0.003, 0.1);
-        let end = |mean: Vector3<f64>| Gaussian { mean, cov };
-        for source in [TrackSource::Stereo, TrackSource::Image, TrackSource::Depth] {
-            let sensed =
-                SensedTrack { track: StereoTrack { before: end(before), after: end(after) }, source };
-            let exact = sensed.track.linearise(&mut before.clone(), &at).unwrap();
-            let mut columns = SMatrix::<f64, 3, ERRORS>::zeros();
-            columns.fixed_columns_mut::<4>(0).copy_from(&sensed.by_calibration(&before, &at).unwrap());
-            columns.fixed_columns_mut::<12>(4).copy_from(&sensed.by_excess(&exact.by_motion, &rig));
-            for k in 0..ERRORS {
-                let misclosure = |h: f64| {
-                    let errors = SensorErrors::from_vector(&(SVector::ith(k, h)));
-                    let track = errors.corrected(&sensed, &rig).track;
-                    track.linearise(&mut track.before.mean.clone(), &at).unwrap().misclosure
-                };
-                let h = 1e-5;
-                let numeric = (misclosure(-h) - misclosure(h)) / (2.0 * h);
-                let error = (numeric - columns.column(k)).amax();
-                assert!(
-                    error < 1e-5 * (1.0 + numeric.amax()),
-                    "{source:?} {k}: {numeric} {}",
-                    columns.column(k)
-                );
-            }
-        }
-    }
 
     #[test]
     fn priors_are_those_of_hands() {
         let tolerance = Tolerance { readout_s: 0.03, delay_s: 0.0, ..Tolerance::rendered() };
-        let prior = tolerance.over(0.1);
-        assert!(!prior.is_exact() && Tolerance::default().over(0.1).is_exact());
+        let prior = tolerance.prior_over(0.1);
+        assert!(!prior.is_exact() && Tolerance::default().prior_over(0.1).is_exact());
         // 2 m/s² and 5 rad/s² over 0.03 s change what happens in 0.1 s by 6 mm and .86°.
         assert!((prior.sigma[4] - 0.006).abs() < 1e-12 && (prior.sigma[9] - 0.015).abs() < 1e-12);
         assert_eq!(prior.sigma[12], 0.0);

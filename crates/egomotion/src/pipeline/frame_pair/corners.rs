@@ -1,8 +1,8 @@
 //! Corners followed through both pairs of images: a few find the motion that guides all of them.
 
 use super::FramePair;
+use crate::estimate::TrackSource;
 use crate::estimate::Unsolvable;
-use crate::estimate::sensor::tolerance::TrackSource;
 use crate::geometry::Twist;
 use crate::observe::StereoTrack;
 use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};

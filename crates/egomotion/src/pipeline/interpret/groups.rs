@@ -7,11 +7,14 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::moving::Moving;
-use crate::estimate::likelihood::robust_start::robust_start;
-use crate::estimate::{Blocks, MotionEstimate, median};
+use crate::estimate::robust_start;
+use crate::estimate::{Blocks, MotionEstimate};
+use crate::geometry::distribution::{CHI2_1_P50, CHI2_6_P999};
+use crate::geometry::median;
 use crate::geometry::{Cells, Gaussian, PixelBounds, StereoRig, upper_median};
 use crate::motion::TimeToImpact;
-use crate::motion::depth_velocity::{DepthVelocity, RigidPrediction, contradict};
+use crate::motion::depth_velocity::contradict;
+use crate::motion::{DepthVelocity, RigidPrediction};
 use crate::observe::{DensePair, StereoTrack};
 use crate::pipeline::config::Config;
 use crate::pipeline::plan::Interval;
@@ -30,9 +33,7 @@ const SAMPLE_STEP_PX: usize = 2;
 /// covers too few of those.
 const BLOCK_PX: f64 = 24.0;
 /// Motions whose squared Mahalanobis distance is less than this are the same: χ²₆(0.999).
-const SAME_MOTION_CHI2: f64 = 22.46;
-/// Median of χ²₁.
-const MEDIAN_CHI2: f64 = 0.454_94;
+const SAME_MOTION_CHI2: f64 = CHI2_6_P999;
 
 /// Something that moves by itself, between two frames.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -307,14 +308,14 @@ impl Sampled {
     fn motion(&self, rig: &StereoRig, config: &Config) -> Option<MotionEstimate> {
         let start = robust_start(&self.tracks, rig, None, &config.seeded_likelihood()).ok()?;
         let mut found = Solver::new(rig, &start, config).likelihood(&self.tracks).ok()?;
-        let layout = Blocks::over(rig, config.block_px);
+        let layout = Blocks::tiling(rig, config.block_px);
         let mut blocks: Vec<usize> =
             self.tracks.iter().map(|track| layout.index(track.before.mean.x, track.before.mean.y)).collect();
         blocks.sort_unstable();
         blocks.dedup();
         let freedom = blocks.len() as f64 - 1.0;
         found.theta.cov *= if freedom > 2.0 { freedom / (freedom - 2.0) } else { f64::INFINITY };
-        found.known().ok()
+        found.with_unbounded_unobserved().ok()
     }
 
     /// Squared scale of the measured VZ about those of the body's motion, in units of their variance; at least 1.
@@ -325,6 +326,6 @@ impl Sampled {
         };
         let mut squares: Vec<f64> = self.velocities.iter().filter_map(square).collect();
         // No square is NaN of nothing.
-        (median(&mut squares) / MEDIAN_CHI2).max(1.0)
+        (median(&mut squares) / CHI2_1_P50).max(1.0)
     }
 }

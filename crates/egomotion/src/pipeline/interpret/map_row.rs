@@ -7,9 +7,8 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 
 use super::groups::Groups;
 use crate::geometry::{Gaussian, StereoRig};
-use crate::motion::DepthVelocity;
-use crate::motion::depth_velocity::{self, RigidPrediction, contradict};
-use crate::motion::impact::{TimeToImpact, Vehicle};
+use crate::motion::depth_velocity::{self, contradict};
+use crate::motion::{DepthVelocity, RigidPrediction, TimeToImpact, Vehicle};
 use crate::observe::DensePair;
 use crate::pipeline::plan::{Interval, PixelVelocity};
 use crate::simd::vectorised;

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use super::groups::Groups;
 use super::map_row::{MapRow, PairToMap};
 use crate::geometry::{Cells, Field, Gaussian, Grid};
+use crate::motion::RigidPrediction;
 use crate::motion::TimeToImpact;
-use crate::motion::depth_velocity::{self, RigidPrediction, rigid_unless_moving};
-use crate::motion::obstacle::{ObstacleCriteria, Sightings};
+use crate::motion::depth_velocity::{self, rigid_unless_moving};
+use crate::motion::{ObstacleCriteria, Sightings};
 use crate::observe::{DensePair, StereoTrack};
 use crate::pipeline::plan::Interval;
 
@@ -111,7 +112,7 @@ pub(super) fn track_sightings(
 ) -> Vec<Sightings> {
     let rig = interval.rig;
     let (width, height) = (rig.width_px, rig.height_px);
-    let cells = Cells::over((width, height), ObstacleCriteria::SPARSE.cell_px);
+    let cells = Cells::tiling((width, height), ObstacleCriteria::SPARSE.cell_px);
     let mut seen = vec![Sightings::default(); cells.count()];
     // The conversion takes what is negative to zero.
     let pixel = |c: f64, n: usize| (c.round() as usize).min(n.saturating_sub(1));

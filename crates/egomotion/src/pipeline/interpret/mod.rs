@@ -16,7 +16,7 @@ use still_world::still_world;
 
 use super::plan::Interval;
 use crate::estimate::MotionEstimate;
-use crate::motion::obstacle::{NoObstacle, Obstacle, ObstacleCriteria, nearest};
+use crate::motion::{NoObstacle, Obstacle, ObstacleCriteria, nearest_obstacle};
 use crate::observe::{DensePair, StereoPyramid, StereoTrack};
 
 /// What a motion means for every pixel.
@@ -35,7 +35,7 @@ pub(super) fn tracks(
 ) -> Result<Obstacle, NoObstacle> {
     let still = still_world(tracks, motion, rows, interval).ok_or(NoObstacle::NothingMeasured)?;
     let mut seen = track_sightings(tracks, &still, interval);
-    nearest(&mut seen, (interval.rig.width_px, interval.rig.height_px), &ObstacleCriteria::SPARSE)
+    nearest_obstacle(&mut seen, (interval.rig.width_px, interval.rig.height_px), &ObstacleCriteria::SPARSE)
 }
 
 /// What a motion means for the pixels of dense fields, whose tracks have left and right places that disagree by `rows`
@@ -58,6 +58,6 @@ pub(super) fn fields(
     // Without a motion nobody knows what will be in the vehicle's way.
     let obstacle = still
         .ok_or(NoObstacle::NothingMeasured)
-        .and_then(|_| nearest(&mut seen, pair.flow.size(), &ObstacleCriteria::DENSE));
+        .and_then(|_| nearest_obstacle(&mut seen, pair.flow.size(), &ObstacleCriteria::DENSE));
     Meaning { maps, moving: groups.map_or_else(Vec::new, Groups::into_groups), obstacle }
 }

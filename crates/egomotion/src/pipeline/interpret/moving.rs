@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use crate::geometry::distribution::CHI2_1_P9973;
 use crate::geometry::{Cells, Gaussian};
-use crate::motion::depth_velocity::RigidPrediction;
+use crate::motion::RigidPrediction;
 use crate::observe::temporal_disparity::{Seen, disparity_change};
 use crate::observe::{DensePair, StereoPyramid};
 
@@ -39,7 +40,7 @@ impl Moving {
         images: (&StereoPyramid, &StereoPyramid),
         rigid: &RigidPrediction<'_>,
     ) -> Self {
-        let layout = Cells::over(pair.flow.size(), CELL_PX);
+        let layout = Cells::tiling(pair.flow.size(), CELL_PX);
         let cells = (0..layout.count())
             .into_par_iter()
             .with_min_len(layout.columns().max(1))
@@ -131,7 +132,7 @@ fn joint((d, variance): (f64, f64), ratio: &Gaussian<1>, maps: Option<&Gaussian<
     (both.cov.m12, both.cov.m21) = (growth * variance, growth * variance);
     if let Some(maps) = maps {
         let (innovation, spread) = (maps.mean.y - both.mean.y, both.cov.m22 + maps.cov.m22);
-        if innovation * innovation < 9.0 * spread {
+        if innovation * innovation < CHI2_1_P9973 * spread {
             let gain = both.cov.column(1) / spread;
             both.mean += gain * innovation;
             both.cov -= gain * gain.transpose() * spread;

@@ -1,8 +1,8 @@
 //! What every pixel would do as part of the still world, with what a wrong calibration adds to its uncertainty.
 
 use crate::estimate::MotionEstimate;
-use crate::estimate::sensor::systematic::common_errors;
-use crate::motion::depth_velocity::{DisparityOffset, RigidPrediction};
+use crate::estimate::systematic_response;
+use crate::motion::{DisparityOffset, RigidPrediction};
 use crate::observe::StereoTrack;
 use crate::pipeline::plan::Interval;
 
@@ -26,10 +26,10 @@ pub(super) fn still_world<'a>(
 ) -> Option<RigidPrediction<'a>> {
     let motion = motion?;
     let kernel = &interval.config.maximum_likelihood.kernel;
-    let common = common_errors(tracks, interval.rig, &motion.phi(), kernel);
-    let offset = common.map_or_else(DisparityOffset::none, |common| DisparityOffset {
+    let systematic = systematic_response(tracks, interval.rig, &motion.phi(), kernel);
+    let offset = systematic.map_or_else(DisparityOffset::none, |systematic| DisparityOffset {
         sigma_px: OFFSET_PER_ROW_DISAGREEMENT * row_disagreement_px.unwrap_or(0.0),
-        phi_per_px: common.by_disparity_offset,
+        phi_per_px: systematic.phi_per_offset_px,
     });
     RigidPrediction::new(&motion.theta, offset, interval.rig)
 }

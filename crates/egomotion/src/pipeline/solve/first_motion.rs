@@ -2,8 +2,8 @@
 
 use super::scene_motion::scene_motion;
 use crate::estimate::Unsolvable;
-use crate::estimate::likelihood::maximum_likelihood::maximum_likelihood;
-use crate::estimate::likelihood::robust_start::robust_start;
+use crate::estimate::maximum_likelihood;
+use crate::estimate::robust_start;
 use crate::geometry::Twist;
 use crate::observe::StereoTrack;
 use crate::pipeline::plan::Interval;

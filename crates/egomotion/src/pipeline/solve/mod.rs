@@ -39,5 +39,5 @@ pub fn solve(
         (Equations::JointFlow, _) => solver.joint(&observed.flows(interval)),
         (Equations::Alignment(form), _) => solver.alignment(&observed.tracks(interval), form),
     };
-    found?.known()
+    found?.with_unbounded_unobserved()
 }

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::estimate::{Unsolvable, median};
-use crate::geometry::{RigidMotion, StereoRig, Twist};
+use crate::estimate::Unsolvable;
+use crate::geometry::{RigidMotion, StereoRig, Twist, median};
 use crate::observe::StereoTrack;
 
 /// A track moves by a motion that leads within this many pixels of where it was found.

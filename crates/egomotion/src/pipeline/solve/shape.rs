@@ -9,10 +9,12 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::solver::{SETTLED_SIGMAS, Solver};
-use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
-use crate::estimate::linear::m_estimator::StudentT;
-use crate::estimate::sensor::tolerance::{SensedTrack, SensorErrors, TrackSource};
-use crate::estimate::{MotionEstimate, Unsolvable, median};
+use crate::estimate::MaximumLikelihoodOptions;
+use crate::estimate::StudentT;
+use crate::estimate::{MotionEstimate, Unsolvable};
+use crate::estimate::{SensedTrack, SensorErrors, TrackSource};
+use crate::geometry::distribution::{CHI2_1_P50_COARSE, CHI2_2_P50};
+use crate::geometry::median;
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::{DensePair, StereoTrack};
 use crate::pipeline::config::Config;
@@ -25,9 +27,6 @@ const SHAPE_ROUNDS: usize = 10;
 const FIRST_REACH_PX: f64 = 8.0;
 /// In the end disparities further from the prediction than this are of another surface, in pixels.
 const LAST_REACH_PX: f64 = 1.0;
-/// Medians of χ² with one and with two degrees of freedom.
-const MEDIAN_1: f64 = 0.455;
-const MEDIAN_2: f64 = 1.386;
 /// A source's variance is corrected by at most this factor either way.
 const LARGEST_FACTOR: f64 = 100.0;
 
@@ -95,12 +94,12 @@ fn observations(
         Some((corrected(track, TrackSource::Depth), pair.flow.get(u, v).is_some()))
     });
     let squares = shapes.iter().filter_map(|(shape, _)| across_surface(&shape.track, rig, motion));
-    let disparity = factor(squares.collect(), MEDIAN_1);
+    let disparity = factor(squares.collect(), CHI2_1_P50_COARSE);
     let placed = |tracks: &[StereoTrack], overlap: f64| {
         let mut tracks: Vec<SensedTrack> =
             tracks.iter().map(|&track| corrected(track, TrackSource::Image)).collect();
         let squares = tracks.iter().filter_map(|sensed| along_surface(&sensed.track, rig, motion));
-        let place = factor(squares.collect(), MEDIAN_2) * overlap;
+        let place = factor(squares.collect(), CHI2_2_P50) * overlap;
         tracks.iter_mut().for_each(|sensed| sensed.track = scaled(&sensed.track, place, disparity));
         tracks
     };

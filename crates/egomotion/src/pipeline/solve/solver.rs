@@ -1,17 +1,17 @@
 //! The methods on observations at hand, each with the configured estimator.
 
 use crate::constrain::{binocular_flow, dcce, image_flow};
+use crate::estimate::LikelihoodTerm;
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
-use crate::estimate::likelihood::maximum_likelihood::{MaximumLikelihood, maximum_likelihood};
-use crate::estimate::linear::errors_in_variables::errors_in_variables;
-use crate::estimate::linear::least_squares::{Weighting, least_squares};
-use crate::estimate::linear::lmeds::{LmedsOptions, lmeds};
-use crate::estimate::linear::m_estimator::m_estimate;
-use crate::estimate::linear::two_step::two_step;
-use crate::estimate::measurement::Measurement;
-use crate::estimate::sensor::augmented::augmented_step;
-use crate::estimate::sensor::tolerance::{SensedTrack, SensorErrors, SensorPrior, TrackSource};
-use crate::estimate::{Blocks, Fit, MotionEstimate, Row, Tolerance, Unsolvable};
+use crate::estimate::augmented_step;
+use crate::estimate::errors_in_variables;
+use crate::estimate::m_estimate;
+use crate::estimate::two_step;
+use crate::estimate::{Blocks, LinearFit, MotionEstimate, Row, Tolerance, Unsolvable};
+use crate::estimate::{LmedsOptions, lmeds};
+use crate::estimate::{MaximumLikelihood, maximum_likelihood};
+use crate::estimate::{SensedTrack, SensorErrors, SensorPrior, TrackSource};
+use crate::estimate::{Weighting, least_squares};
 use crate::geometry::{StereoRig, Twist};
 use crate::observe::{DepthChange, StereoFlow, StereoTrack};
 use crate::pipeline::config::{Config, EstimatorKind};
@@ -35,17 +35,17 @@ pub struct Solver<'a> {
 impl<'a> Solver<'a> {
     /// Rows get their σ, and iterations their start, at the motion `start`.
     pub fn new(rig: &'a StereoRig, start: &'a Twist, config: &'a Config) -> Self {
-        let exact = Tolerance::default().over(0.0);
-        Self { rig, start, config, blocks: Blocks::over(rig, config.block_px), prior: exact }
+        let exact = Tolerance::default().prior_over(0.0);
+        Self { rig, start, config, blocks: Blocks::tiling(rig, config.block_px), prior: exact }
     }
 
     /// The same, with the sensor's tolerance over an interval of `dt_s` seconds.
     pub(super) fn with_tolerance(self, dt_s: f64) -> Self {
-        Self { prior: self.config.tolerance.over(dt_s), ..self }
+        Self { prior: self.config.tolerance.prior_over(dt_s), ..self }
     }
 
     /// The configured estimator on rows whose scale is as printed.
-    fn fit<const N: usize>(&self, rows: &[Row<N>]) -> Result<Fit<N>, Unsolvable> {
+    fn fit<const N: usize>(&self, rows: &[Row<N>]) -> Result<LinearFit<N>, Unsolvable> {
         match self.config.estimator {
             EstimatorKind::Ls => least_squares(rows, Weighting::Unit),
             EstimatorKind::Lmeds => lmeds(rows, Weighting::Unit, &self.lmeds()),
@@ -65,7 +65,7 @@ impl<'a> Solver<'a> {
     ///
     /// # Errors
     /// [`Unsolvable`] when the observations do not determine a motion.
-    pub fn likelihood<M: Measurement>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
+    pub fn likelihood<M: LikelihoodTerm>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
         let options = &self.config.maximum_likelihood;
         let blocks = Some(&self.blocks);
         let found = maximum_likelihood(observations, self.rig, self.start, blocks, &options.kernel)?;
@@ -78,8 +78,8 @@ impl<'a> Solver<'a> {
     fn phase_covariance(&self, found: &MaximumLikelihood) -> Matrix6<f64> {
         let known = found.motion.theta.cov.iter().all(|v| v.is_finite());
         let sigma_px = self.config.maximum_likelihood.phase_error_px;
-        let common = found.common.filter(|_| known);
-        common.map_or_else(Matrix6::zeros, |common| common.phase_covariance(sigma_px))
+        let systematic = found.systematic.filter(|_| known);
+        systematic.map_or_else(Matrix6::zeros, |systematic| systematic.phase_covariance(sigma_px))
     }
 
     /// Maximum likelihood of tracks that a sensor made which is known only so well.

@@ -3,22 +3,29 @@
 use nalgebra::{ArrayStorage, Matrix6, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 
+use super::mixture::ResidualModel;
+use crate::constrain::{LinearisationPoint, Measurement, Misclosure};
 use crate::estimate::certainty::blocks::{BlockScore, Blocks};
-use crate::estimate::likelihood::mixture::Mixture;
-use crate::estimate::measurement::{At, Linearised, Measurement};
+use crate::geometry::distribution::CHI2_3_P99;
 use crate::geometry::gaussian::{accumulate, product};
+use crate::geometry::{StereoRig, Twist, median};
 use crate::observe::{StereoFlow, StereoTrack};
 use crate::simd::vectorised;
 
-/// Sums over observations, by φ.
+/// Squared misclosure, in units of its scaled covariance, beyond which an observation is no inlier.
+const INLIER_Q: f64 = CHI2_3_P99;
+/// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
+const STRIP: usize = 512;
+
+/// FrameSums over observations, by φ.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Step {
+pub struct ScoreSums {
     /// Σ w Gᵀ S⁻¹ G and Σ w Gᵀ S⁻¹ e.
     pub(crate) score: BlockScore<6>,
     /// By how much the score's true derivative is less than the information, because weights change as well.
     reweighting: Matrix6<f64>,
     /// Σ w Gᵀ S⁻¹ δe for errors that all observations share: amplitudes of the phase error of x, y and d, an offset of disparity.
-    pub(crate) shared: SMatrix<f64, 6, 4>,
+    pub(crate) systematic: SMatrix<f64, 6, 4>,
     /// Σ w.
     weights: f64,
     /// Σ w q.
@@ -40,18 +47,11 @@ pub struct Step {
 pub struct Weighing<'a> {
     /// Blocks whose sums are wanted; without them all is one block.
     pub(crate) blocks: Option<&'a Blocks>,
-    pub(crate) mixture: Mixture,
-    /// Squared scale of the misclosures in units of their stated covariance.
-    pub(crate) scale2: f64,
+    /// How misclosures are distributed.
+    pub(crate) residuals: ResidualModel,
 }
 
-/// Squared misclosure, in units of its scaled covariance, beyond which an observation is no inlier: χ²₃(0.99).
-const INLIER_Q: f64 = 11.345;
-
-/// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
-const STRIP: usize = 512;
-
-impl Step {
+impl ScoreSums {
     /// Derivative of the score by φ, with the robust weights' own.
     pub(crate) fn bread(&self) -> Matrix6<f64> {
         self.score.information - self.reweighting
@@ -77,20 +77,20 @@ impl Step {
     }
 
     #[inline(always)]
-    fn add(&mut self, l: &Linearised, weighing: &Weighing<'_>) {
-        let scale2 = weighing.scale2;
-        let pull = product(&l.inverse_cov, &l.misclosure);
-        let q = l.misclosure.dot(&pull);
-        let (weight, slope) = weighing.mixture.weight(q / scale2);
-        let weighted = product(&l.by_motion.transpose(), &(l.inverse_cov * weight));
-        let unweighted: Vector6<f64> = product(&l.by_motion.transpose(), &pull);
-        accumulate(&mut self.score.information, &weighted, &l.by_motion);
-        accumulate(&mut self.score.score, &weighted, &l.misclosure);
+    fn add(&mut self, l: &Misclosure, weighing: &Weighing<'_>) {
+        let ResidualModel { mixture, scale2 } = weighing.residuals;
+        let pull = product(&l.inverse_cov, &l.e);
+        let q = l.e.dot(&pull);
+        let (weight, slope) = mixture.weight(q / scale2);
+        let weighted = product(&l.motion_jacobian.transpose(), &(l.inverse_cov * weight));
+        let unweighted: Vector6<f64> = product(&l.motion_jacobian.transpose(), &pull);
+        accumulate(&mut self.score.information, &weighted, &l.motion_jacobian);
+        accumulate(&mut self.score.score, &weighted, &l.e);
         let change = weight * slope / scale2;
         accumulate(&mut self.reweighting, &(unweighted * change), &unweighted.transpose());
-        let [x, y, d] = l.by_phase.data.0;
-        let errors = SMatrix::<f64, 3, 4>::from_data(ArrayStorage([x, y, d, l.by_offset.into()]));
-        accumulate(&mut self.shared, &weighted, &errors);
+        let [x, y, d] = l.phase_jacobian.data.0;
+        let errors = SMatrix::<f64, 3, 4>::from_data(ArrayStorage([x, y, d, l.offset_jacobian.into()]));
+        accumulate(&mut self.systematic, &weighted, &errors);
         self.weights += weight;
         self.weighted_square += weight * q;
         self.score_square += weight * weight * q;
@@ -104,7 +104,7 @@ impl Step {
         self.score.information += other.score.information;
         self.score.score += other.score.score;
         self.reweighting += other.reweighting;
-        self.shared += other.shared;
+        self.systematic += other.systematic;
         self.weights += other.weights;
         self.weighted_square += other.weighted_square;
         self.score_square += other.score_square;
@@ -115,67 +115,105 @@ impl Step {
         self
     }
 
-    /// Sums by the small motion δ of a measurement as sums by φ.
+    /// FrameSums by the small motion δ of a measurement as sums by φ.
     fn by_phi(mut self, jacobian: &Matrix6<f64>) -> Self {
         let across = jacobian.transpose();
         self.score.information = across * self.score.information * jacobian;
         self.score.score = across * self.score.score;
         self.reweighting = across * self.reweighting * jacobian;
-        self.shared = across * self.shared;
+        self.systematic = across * self.systematic;
         self
     }
 }
 
+/// Sums of consecutive observations, each with the block in which they lie.
+type BlockRuns = Vec<(usize, ScoreSums)>;
+
 /// The sums of one step: of each block, and of all observations.
 #[derive(Debug, Clone)]
-pub(crate) struct Sums {
-    pub(crate) by_block: Vec<Step>,
-    pub(crate) whole: Step,
+pub(crate) struct FrameSums {
+    pub(crate) by_block: Vec<ScoreSums>,
+    pub(crate) whole: ScoreSums,
 }
 
-impl Sums {
+impl FrameSums {
     /// Linearise about a motion and sum; structures are improved.
-    pub(crate) fn over<M: Measurement>(
+    pub(crate) fn linearised<M: LikelihoodTerm>(
         observations: &[M],
         structures: &mut [Vector3<f64>],
-        at: &At<'_>,
+        at: &LinearisationPoint<'_>,
         weighing: &Weighing<'_>,
     ) -> Self {
-        let strips: Vec<Vec<(usize, Step)>> = observations
+        debug_assert_eq!(observations.len(), structures.len(), "each observation has one structure");
+        debug_assert!(weighing.residuals.scale2 > 0.0, "weights are by residuals in units of their scale");
+        let strips: Vec<BlockRuns> = observations
             .par_chunks(STRIP)
             .zip(structures.par_chunks_mut(STRIP))
             .map(|(observations, structures)| M::sums(observations, structures, at, weighing))
             .collect();
-        let mut by_block = vec![Step::default(); weighing.blocks.map_or(1, Blocks::count)];
+        let mut by_block = vec![ScoreSums::default(); weighing.blocks.map_or(1, Blocks::count)];
         for (block, step) in strips.iter().flatten() {
             by_block[*block] = by_block[*block].merged(step);
         }
-        let jacobian = M::by_phi(at);
+        let jacobian = M::small_motion_jacobian(at);
         by_block.iter_mut().for_each(|step| *step = step.by_phi(&jacobian));
-        let whole = by_block.iter().fold(Step::default(), Step::merged);
+        let whole = by_block.iter().fold(ScoreSums::default(), ScoreSums::merged);
         Self { by_block, whole }
     }
 }
 
-vectorised! {
-    pub(crate) of_tracks(observations: &[StereoTrack], structures: &mut [Vector3<f64>], at: &At<'_>, weighing: &Weighing<'_>)
-        -> Vec<(usize, Step)> { strip(observations, structures, at, weighing) }
-}
-vectorised! {
-    pub(crate) of_flows(observations: &[StereoFlow], structures: &mut [Vector3<f64>], at: &At<'_>, weighing: &Weighing<'_>)
-        -> Vec<(usize, Step)> { strip(observations, structures, at, weighing) }
+/// An observation as a term of the likelihood: a misclosure whose sums over a strip are made by vector kernels.
+pub trait LikelihoodTerm: Measurement {
+    /// The sums of consecutive observations, one for each run of them that lies in one block.
+    fn sums(
+        observations: &[Self],
+        structures: &mut [Vector3<f64>],
+        at: &LinearisationPoint<'_>,
+        weighing: &Weighing<'_>,
+    ) -> BlockRuns;
 }
 
-/// [`Measurement::sums`] of observations of any kind.
+impl LikelihoodTerm for StereoTrack {
+    fn sums(
+        observations: &[Self],
+        structures: &mut [Vector3<f64>],
+        at: &LinearisationPoint<'_>,
+        weighing: &Weighing<'_>,
+    ) -> BlockRuns {
+        of_tracks(observations, structures, at, weighing)
+    }
+}
+
+impl LikelihoodTerm for StereoFlow {
+    fn sums(
+        observations: &[Self],
+        structures: &mut [Vector3<f64>],
+        at: &LinearisationPoint<'_>,
+        weighing: &Weighing<'_>,
+    ) -> BlockRuns {
+        of_flows(observations, structures, at, weighing)
+    }
+}
+
+vectorised! {
+    of_tracks(observations: &[StereoTrack], structures: &mut [Vector3<f64>], at: &LinearisationPoint<'_>, weighing: &Weighing<'_>)
+        -> BlockRuns { strip(observations, structures, at, weighing) }
+}
+vectorised! {
+    of_flows(observations: &[StereoFlow], structures: &mut [Vector3<f64>], at: &LinearisationPoint<'_>, weighing: &Weighing<'_>)
+        -> BlockRuns { strip(observations, structures, at, weighing) }
+}
+
+/// [`LikelihoodTerm::sums`] of observations of any kind.
 #[inline(always)]
 fn strip<M: Measurement>(
     observations: &[M],
     structures: &mut [Vector3<f64>],
-    at: &At<'_>,
+    at: &LinearisationPoint<'_>,
     weighing: &Weighing<'_>,
-) -> Vec<(usize, Step)> {
+) -> BlockRuns {
     let mut runs = Vec::new();
-    let mut run = (0, Step::default());
+    let mut run = (0, ScoreSums::default());
     for (observation, structure) in observations.iter().zip(structures) {
         let (x, y) = observation.position();
         let block = weighing.blocks.map_or(0, |blocks| blocks.index(x, y));
@@ -183,7 +221,7 @@ fn strip<M: Measurement>(
             if run.1.used > 0 {
                 runs.push(run);
             }
-            run = (block, Step::default());
+            run = (block, ScoreSums::default());
         }
         if let Some(l) = observation.linearise(structure, at) {
             run.1.add(&l, weighing);
@@ -191,4 +229,20 @@ fn strip<M: Measurement>(
     }
     runs.push(run);
     runs
+}
+
+/// q = eᵀ S⁻¹ e of every observation in front of the camera, with the structure held at its measured value (the Sampson
+/// form).
+pub(crate) fn squares<M: Measurement>(observations: &[M], at: &LinearisationPoint<'_>) -> Vec<f64> {
+    let square = |o: &M| {
+        let l = o.linearise(&mut o.structure(), at)?;
+        Some(l.e.dot(&(l.inverse_cov * l.e)))
+    };
+    observations.iter().filter_map(square).collect()
+}
+
+/// The median of q at a motion; infinite without observations.
+pub(crate) fn median_square<M: Measurement>(phi: &Twist, sample: &[M], rig: &StereoRig) -> f64 {
+    let middle = median(&mut squares(sample, &LinearisationPoint::new(*phi, rig)));
+    if middle.is_nan() { f64::INFINITY } else { middle }
 }

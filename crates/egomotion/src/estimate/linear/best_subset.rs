@@ -9,14 +9,25 @@
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
-use crate::estimate::linear::least_squares::Weighting;
-use crate::estimate::linear::row::Row;
-use crate::estimate::median;
+use super::least_squares::Weighting;
+use super::row::Row;
+use crate::geometry::median;
 use crate::simd::vectorised;
+
+/// Candidates are ordered by their median over about this many rows: the better the first is, the sooner others drop.
+const PREVIEW_ROWS: usize = 1024;
+/// Rows whose squares are taken at once by one thread; the answer does not depend on it.
+pub(super) const STRIP: usize = 8192;
+/// Rows in a chunk: its columns fit into the cache next to the core.
+const CHUNK: usize = 512;
+/// Candidates that are counted by one task, chunk by chunk: so many that a chunk is used often while it is in the cache.
+const CANDIDATES_PER_TASK: usize = 36;
+/// Beyond this magnitude single precision is not certain of anything, and no candidate is dropped.
+const LARGEST_SINGLE: f64 = 1e30;
 
 /// The best subset found by the search: its θ and the median of its squared residuals.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Search<const N: usize> {
+pub struct BestSubset<const N: usize> {
     /// θ that fits the subset exactly.
     pub theta: SVector<f64, N>,
     /// Median over all rows of the squared residual.
@@ -25,15 +36,15 @@ pub struct Search<const N: usize> {
 
 /// Minimise the median of squared residuals over the given subsets of N row indices, (58).
 ///
-/// Of equal medians the first subset's is taken: the answer is that of [`plain_search`], bit for bit.
-pub fn search<const N: usize>(
+/// Of equal medians the first subset's is taken: the answer is that of [`best_subset_plain`], bit for bit.
+pub fn best_subset<const N: usize>(
     rows: &[Row<N>],
     weighting: Weighting,
     subsets: impl Iterator<Item = [usize; N]>,
-) -> Option<Search<N>> {
+) -> Option<BestSubset<N>> {
     let candidates = in_order_of_promise(rows, weighting, distinct(rows, subsets));
     let columns = Columns::of(rows, weighting);
-    let mut best: Option<(Search<N>, usize)> = None;
+    let mut best: Option<(BestSubset<N>, usize)> = None;
     let mut left = candidates.as_slice();
     let mut kept;
     let mut squares = vec![0.0; rows.len()];
@@ -48,7 +59,7 @@ pub fn search<const N: usize>(
             median_square < b.median_square || (median_square == b.median_square && candidate.index < index)
         });
         if better {
-            best = Some((Search { theta: candidate.theta, median_square }, candidate.index));
+            best = Some((BestSubset { theta: candidate.theta, median_square }, candidate.index));
             kept = columns.within(left, median_square);
             left = &kept;
         }
@@ -57,25 +68,25 @@ pub fn search<const N: usize>(
 }
 
 /// The same, as it is defined: every median of every subset, in double precision and in order.
-pub fn plain_search<const N: usize>(
+pub fn best_subset_plain<const N: usize>(
     rows: &[Row<N>],
     weighting: Weighting,
     subsets: impl Iterator<Item = [usize; N]>,
-) -> Option<Search<N>> {
-    let mut best: Option<Search<N>> = None;
+) -> Option<BestSubset<N>> {
+    let mut best: Option<BestSubset<N>> = None;
     for subset in subsets {
         let Some(theta) = exact_fit(rows, &subset) else { continue };
         let mut squares: Vec<f64> = rows.iter().map(|row| square(row, weighting, &theta)).collect();
         let median_square = median(&mut squares);
         if best.is_none_or(|b| median_square < b.median_square) {
-            best = Some(Search { theta, median_square });
+            best = Some(BestSubset { theta, median_square });
         }
     }
     best
 }
 
 /// Squared residual of a row.
-pub(crate) fn square<const N: usize>(row: &Row<N>, weighting: Weighting, theta: &SVector<f64, N>) -> f64 {
+pub(super) fn square<const N: usize>(row: &Row<N>, weighting: Weighting, theta: &SVector<f64, N>) -> f64 {
     weighting.of(row) * row.residual(theta).powi(2)
 }
 
@@ -110,16 +121,14 @@ fn distinct<const N: usize>(rows: &[Row<N>], subsets: impl Iterator<Item = [usiz
     candidates
 }
 
-/// Rows on which candidates are compared to begin with.
-const SAMPLE: usize = 1024;
-
 /// Candidates by their median over a few rows that are spread evenly.
 fn in_order_of_promise<const N: usize>(
     rows: &[Row<N>],
     weighting: Weighting,
     candidates: Vec<Candidate<N>>,
 ) -> Vec<Candidate<N>> {
-    let sample: Vec<Row<N>> = rows.iter().step_by(rows.len().div_ceil(SAMPLE).max(1)).copied().collect();
+    let sample: Vec<Row<N>> =
+        rows.iter().step_by(rows.len().div_ceil(PREVIEW_ROWS).max(1)).copied().collect();
     let mut judged: Vec<(f64, Candidate<N>)> = candidates
         .into_par_iter()
         .map(|candidate| {
@@ -131,9 +140,6 @@ fn in_order_of_promise<const N: usize>(
     judged.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.index.cmp(&b.1.index)));
     judged.into_iter().map(|(_, candidate)| candidate).collect()
 }
-
-/// Rows whose squares are taken at once by one thread.
-pub(crate) const STRIP: usize = 8192;
 
 /// Median of the squared residuals; `None` where it exceeds `limit`.
 fn median_within<const N: usize>(
@@ -155,9 +161,6 @@ fn median_within<const N: usize>(
     (2 * beyond <= rows.len()).then(|| median(squares))
 }
 
-/// Rows in a chunk: its columns fit into the cache next to the core.
-const CHUNK: usize = 512;
-
 /// The rows in single precision, in chunks of columns: b and a, times the root of the weight.
 struct Columns<const N: usize> {
     chunks: Vec<Chunk<N>>,
@@ -171,9 +174,6 @@ struct Chunk<const N: usize> {
     most: (f64, [f64; N]),
 }
 
-/// Candidates that are counted together.
-const TOGETHER: usize = 36;
-
 impl<const N: usize> Columns<N> {
     fn of(rows: &[Row<N>], weighting: Weighting) -> Self {
         Self {
@@ -185,7 +185,10 @@ impl<const N: usize> Columns<N> {
     /// Those of the candidates of which it is not certain that their median exceeds `median_square`.
     fn within(&self, candidates: &[Candidate<N>], median_square: f64) -> Vec<Candidate<N>> {
         let limit = median_square.sqrt();
-        candidates.par_chunks(TOGETHER).flat_map_iter(|some| self.some_within(some, limit)).collect()
+        candidates
+            .par_chunks(CANDIDATES_PER_TASK)
+            .flat_map_iter(|some| self.some_within(some, limit))
+            .collect()
     }
 
     fn some_within(&self, candidates: &[Candidate<N>], limit: f64) -> Vec<Candidate<N>> {
@@ -228,8 +231,7 @@ impl<const N: usize> Chunk<N> {
         // What is too small for a normal number loses more, but no more than this.
         let least = f64::from(f32::MIN_POSITIVE) * (2.0 + N as f64 + theta.abs().sum());
         let bound = (limit * (1.0 + 1e-6) + rounding * reach + least) as f32;
-        // Beyond the range of single precision nothing is certain.
-        if !(reach < 1e30 && bound.is_finite() && theta.amax() < 1e30) {
+        if !(reach < LARGEST_SINGLE && bound.is_finite() && theta.amax() < LARGEST_SINGLE) {
             return 0;
         }
         match N {
@@ -276,7 +278,7 @@ mod tests {
     use rand_pcg::Pcg64Mcg;
 
     use super::*;
-    use crate::estimate::linear::lmeds::random_subsets;
+    use crate::estimate::random_subsets::random_subsets;
 
     /// Rows about a truth, a share of them anywhere; σ differs from row to row.
     fn rows<const N: usize>(count: usize, wild: f64, step: Option<f64>, seed: u64) -> Vec<Row<N>> {
@@ -298,14 +300,14 @@ mod tests {
     fn agrees<const N: usize>(rows: &[Row<N>], subsets: usize) {
         for weighting in [Weighting::Unit, Weighting::InverseVariance] {
             let all = || random_subsets::<N>(rows.len(), subsets, 7);
-            let plain = plain_search(rows, weighting, all());
-            assert_eq!(search(rows, weighting, all()), plain);
+            let plain = best_subset_plain(rows, weighting, all());
+            assert_eq!(best_subset(rows, weighting, all()), plain);
             // In any order: what is best does not depend on what is met first, but for ties.
             let mut turned: Vec<[usize; N]> = all().collect();
             turned.reverse();
             assert_eq!(
-                search(rows, weighting, turned.iter().copied()),
-                plain_search(rows, weighting, turned.into_iter())
+                best_subset(rows, weighting, turned.iter().copied()),
+                best_subset_plain(rows, weighting, turned.into_iter())
             );
         }
     }
@@ -317,7 +319,7 @@ mod tests {
             agrees(&rows::<3>(count, wild, None, 2), 200);
             agrees(&rows::<6>(count, wild, None, 3), 300);
         }
-        assert_eq!(search::<2>(&[], Weighting::Unit, std::iter::empty()), None);
+        assert_eq!(best_subset::<2>(&[], Weighting::Unit, std::iter::empty()), None);
     }
 
     #[test]
@@ -352,9 +354,9 @@ mod tests {
         let rows = rows::<6>(20_000, 0.4, None, 10);
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| search(&rows, Weighting::Unit, random_subsets(rows.len(), 100, 3)))
+            pool.install(|| best_subset(&rows, Weighting::Unit, random_subsets(rows.len(), 100, 3)))
         };
         assert_eq!(with(1), with(5));
-        assert_eq!(with(1), plain_search(&rows, Weighting::Unit, random_subsets(rows.len(), 100, 3)));
+        assert_eq!(with(1), best_subset_plain(&rows, Weighting::Unit, random_subsets(rows.len(), 100, 3)));
     }
 }

@@ -1,45 +1,59 @@
 //! Observations as three equations between what was measured and φ, linearised with their structure eliminated.
+//!
+//! An observation measures a point's structure (x, y, d) and where the point goes. The *misclosure* e is the difference
+//! between what was seen after the motion and what the motion predicts of the structure. The structure is eliminated:
+//! its noise goes through the prediction into the covariance S of e, so that φ is the only unknown left. A field whose
+//! name ends in `_jacobian` is a derivative, whose rows are those of e.
 
 use nalgebra::{ArrayStorage, Matrix3, Matrix6, SMatrix, Vector3, Vector4};
 
-use super::median;
-use crate::estimate::likelihood::step::{self, Step, Weighing};
 use crate::geometry::gaussian::{accumulate, product};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::{StereoFlow, StereoTrack};
 
-/// The motion about which observations are linearised, with what they share.
+/// How far a structure may move from where it was measured, in standard deviations.
+///
+/// An inlier is never pulled so far. An outlier would be pulled to where its derivatives are so large that no robust
+/// weight tames them.
+const LARGEST_STRUCTURE_SHIFT: f64 = 5.0;
+/// A structure keeps its last value when a step would leave it less than this share of its disparity: a first guess may
+/// be wild, and a structure must stay in front of the camera.
+const LEAST_DISPARITY_SHARE: f64 = 0.1;
+
+/// The motion about which observations are linearised, and the rig that made them.
 #[derive(Debug, Clone, Copy)]
-pub struct At<'a> {
-    pub(super) phi: Twist,
+pub struct LinearisationPoint<'a> {
+    phi: Twist,
     motion: RigidMotion,
     rig: &'a StereoRig,
 }
 
-impl<'a> At<'a> {
-    /// Linearise about φ.
+impl<'a> LinearisationPoint<'a> {
+    /// The motion φ, per interval, seen by `rig`.
     pub fn new(phi: Twist, rig: &'a StereoRig) -> Self {
         Self { motion: phi.exp(), phi, rig }
     }
 
     /// The rig.
-    pub(super) fn rig(&self) -> &'a StereoRig {
+    pub(crate) fn rig(&self) -> &'a StereoRig {
         self.rig
     }
 }
 
-/// Misclosure e of an observation, the inverse of its covariance S, and how e changes.
+/// The misclosure e of an observation, the inverse of its covariance S, and how e changes.
 #[derive(Debug, Clone, Copy)]
-pub struct Linearised {
-    pub(super) misclosure: Vector3<f64>,
-    pub(super) inverse_cov: Matrix3<f64>,
-    /// −∂e/∂δ, where δ is the small motion of [`Measurement::by_phi`].
-    pub(super) by_motion: SMatrix<f64, 3, 6>,
+pub struct Misclosure {
+    /// e, in pixels: what was seen after the motion less what the motion predicts.
+    pub e: Vector3<f64>,
+    /// S⁻¹, in 1/px².
+    pub inverse_cov: Matrix3<f64>,
+    /// −∂e/∂δ, where δ is the small motion of [`Measurement::small_motion_jacobian`].
+    pub motion_jacobian: SMatrix<f64, 3, 6>,
     /// ∂e per pixel by which every disparity is too large, before and after.
-    pub(super) by_offset: Vector3<f64>,
+    pub(crate) offset_jacobian: Vector3<f64>,
     /// ∂e per pixel of the amplitude by which x, y, and disparity (of flows the right camera's x) err with
-    /// their sub-pixel phase, one a column; see [`crate::estimate::sensor::systematic`].
-    pub(super) by_phase: Matrix3<f64>,
+    /// their sub-pixel phase, one a column.
+    pub(crate) phase_jacobian: Matrix3<f64>,
 }
 
 /// S⁻¹ by S = L D Lᵀ; `None` unless S is positive definite, which rounding or a careless caller may break.
@@ -64,24 +78,17 @@ fn inverse(s: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     Some(Matrix3::new(i1 + a * a * i2 + c * c * i3, m12, m13, m12, i2 + b * b * i3, m23, m13, m23, i3))
 }
 
-/// An observation that maximum likelihood can use.
+/// An observation that is three equations between what was measured and φ.
 pub trait Measurement: Copy + Send + Sync {
     /// Image coordinates (x, y), in pixels, to find the observation's block.
     fn position(&self) -> (f64, f64);
-    /// First value (x, y, d) of the structure.
+    /// First value (x, y, d) of the structure, in pixels.
     fn structure(&self) -> Vector3<f64>;
     /// Linearise about a motion and a structure, and improve the structure; `None` behind the camera.
-    fn linearise(&self, structure: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised>;
-    /// The sums of consecutive observations, one for each run of them that lies in one block.
-    fn sums(
-        observations: &[Self],
-        structures: &mut [Vector3<f64>],
-        at: &At<'_>,
-        weighing: &Weighing<'_>,
-    ) -> Vec<(usize, Step)>;
+    fn linearise(&self, structure: &mut Vector3<f64>, at: &LinearisationPoint<'_>) -> Option<Misclosure>;
     /// ∂δ/∂φ of the small motion δ by which observations of this kind are linearised: it is the same for
     /// all of them, so it is applied to sums.
-    fn by_phi(at: &At<'_>) -> Matrix6<f64>;
+    fn small_motion_jacobian(at: &LinearisationPoint<'_>) -> Matrix6<f64>;
 }
 
 /// The wave of period 1 and amplitude 1 that sin 2πu is, by two parabolas.
@@ -89,25 +96,20 @@ pub trait Measurement: Copy + Send + Sync {
 /// So do matches err with the fraction of a pixel by which they are displaced: not at whole pixels, where both
 /// images are sampled alike, nor half-way, where either side pulls as much.
 #[inline(always)]
-pub(super) fn wave(u: f64) -> f64 {
+pub(crate) fn phase_wave(u: f64) -> f64 {
     let phase = u - u.round();
     8.0 * phase * (1.0 - 2.0 * phase.abs())
 }
 
-/// How far a structure may move from where it was measured, in standard deviations.
-const MOST_PULL: f64 = 5.0;
-
 /// Factor that holds a structure back when its squared distance from the measured one is `square`.
-///
-/// An inlier is never pulled so far. An outlier would be pulled to where its derivatives are so
-/// large that no robust weight tames them.
 fn restraint(square: f64) -> f64 {
-    if square > MOST_PULL * MOST_PULL { MOST_PULL / square.sqrt() } else { 1.0 }
+    const LIMIT: f64 = LARGEST_STRUCTURE_SHIFT;
+    if square > LIMIT * LIMIT { LIMIT / square.sqrt() } else { 1.0 }
 }
 
 /// Where the motion leads a structure (x, y, d), and how that changes with the structure; `None` behind the camera.
 #[inline(always)]
-pub(super) fn led(s: &Vector3<f64>, at: &At<'_>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
+pub(crate) fn predict(s: &Vector3<f64>, at: &LinearisationPoint<'_>) -> Option<(Vector3<f64>, Matrix3<f64>)> {
     let point = at.rig.point(s)?;
     let (turn, from) = (&at.motion.rotation, &at.motion.translation);
     let moved = at.motion.apply(&point);
@@ -115,7 +117,7 @@ pub(super) fn led(s: &Vector3<f64>, at: &At<'_>) -> Option<(Vector3<f64>, Matrix
     // (X, Y, Z) is (x, y, f) b/d.
     let k = at.rig.baseline_m / s.z;
     let column = |x: f64, y: f64, z: f64| at.rig.projected_change(&moved, &Vector3::new(x, y, z)).into();
-    let by_structure = Matrix3::from_data(ArrayStorage([
+    let structure_jacobian = Matrix3::from_data(ArrayStorage([
         column(turn.m11 * k, turn.m21 * k, turn.m31 * k),
         column(turn.m12 * k, turn.m22 * k, turn.m32 * k),
         {
@@ -123,7 +125,7 @@ pub(super) fn led(s: &Vector3<f64>, at: &At<'_>) -> Option<(Vector3<f64>, Matrix
             column((moved.x - from.x) * per_px, (moved.y - from.y) * per_px, (moved.z - from.z) * per_px)
         },
     ]));
-    Some((predicted, by_structure))
+    Some((predicted, structure_jacobian))
 }
 
 impl Measurement for StereoTrack {
@@ -136,43 +138,33 @@ impl Measurement for StereoTrack {
     }
 
     #[inline(always)]
-    fn linearise(&self, s: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised> {
-        let (predicted, by_structure) = led(s, at)?;
-        let misclosure = self.after.mean - predicted - product(&by_structure, &(self.before.mean - *s));
-        let gain = product(&self.before.cov, &by_structure.transpose());
+    fn linearise(&self, s: &mut Vector3<f64>, at: &LinearisationPoint<'_>) -> Option<Misclosure> {
+        let (predicted, structure_jacobian) = predict(s, at)?;
+        let e = self.after.mean - predicted - product(&structure_jacobian, &(self.before.mean - *s));
+        let gain = product(&self.before.cov, &structure_jacobian.transpose());
         let mut cov = self.after.cov;
-        accumulate(&mut cov, &by_structure, &gain);
+        accumulate(&mut cov, &structure_jacobian, &gain);
         let inverse_cov = inverse(&cov)?;
-        let pull = product(&inverse_cov, &misclosure);
+        let pull = product(&inverse_cov, &e);
         let shift = product(&gain, &pull);
-        let improved = self.before.mean + shift * restraint(pull.dot(&product(&by_structure, &shift)));
-        // A first guess may be wild; a structure must stay in front of the camera.
-        if improved.z > 0.1 * s.z {
+        let improved = self.before.mean + shift * restraint(pull.dot(&product(&structure_jacobian, &shift)));
+        if improved.z > LEAST_DISPARITY_SHARE * s.z {
             *s = improved;
         }
-        let by_motion = at.rig.velocity_jacobian(&predicted);
-        let by_offset = Vector3::z() - by_structure.column(2);
+        let motion_jacobian = at.rig.velocity_jacobian(&predicted);
+        let offset_jacobian = Vector3::z() - structure_jacobian.column(2);
         let (before, after) = (&self.before.mean, &self.after.mean);
-        let by_phase = Matrix3::from_data(ArrayStorage([
-            [wave(after.x - before.x), 0.0, 0.0],
-            [0.0, wave(after.y - before.y), 0.0],
-            (Vector3::z() * wave(after.z) - by_structure.column(2) * wave(before.z)).into(),
+        let phase_jacobian = Matrix3::from_data(ArrayStorage([
+            [phase_wave(after.x - before.x), 0.0, 0.0],
+            [0.0, phase_wave(after.y - before.y), 0.0],
+            (Vector3::z() * phase_wave(after.z) - structure_jacobian.column(2) * phase_wave(before.z)).into(),
         ]));
-        Some(Linearised { misclosure, inverse_cov, by_motion, by_offset, by_phase })
+        Some(Misclosure { e, inverse_cov, motion_jacobian, offset_jacobian, phase_jacobian })
     }
 
     /// Motions are composed: exp(φ + dφ) = exp(δ) exp(φ).
-    fn by_phi(at: &At<'_>) -> Matrix6<f64> {
+    fn small_motion_jacobian(at: &LinearisationPoint<'_>) -> Matrix6<f64> {
         at.phi.left_jacobian()
-    }
-
-    fn sums(
-        observations: &[Self],
-        structures: &mut [Vector3<f64>],
-        at: &At<'_>,
-        weighing: &Weighing<'_>,
-    ) -> Vec<(usize, Step)> {
-        step::of_tracks(observations, structures, at, weighing)
     }
 }
 
@@ -185,7 +177,7 @@ impl Measurement for StereoFlow {
         Vector3::new(self.x_px, self.y_px, self.measured.mean[0])
     }
 
-    fn linearise(&self, s: &mut Vector3<f64>, at: &At<'_>) -> Option<Linearised> {
+    fn linearise(&self, s: &mut Vector3<f64>, at: &LinearisationPoint<'_>) -> Option<Misclosure> {
         let (x, y, d) = (s.x, s.y, s.z);
         if d <= 0.0 {
             return None;
@@ -201,56 +193,48 @@ impl Measurement for StereoFlow {
         );
         let predicted = scaled * d + turned;
         let rate = Vector3::new(0.0, 0.0, scaled.z + turned.z / d);
-        let by_d = scaled + rate;
+        let disparity_jacobian = scaled + rate;
         // (d, v_x, v_y, v_x right) → (v_x, v_y, Δv) − prediction's change with d.
         let measured = &self.measured.mean;
         let flow = Vector3::new(measured[1], measured[2], measured[1] - measured[3]);
-        let misclosure = flow - predicted - by_d * (measured[0] - d);
+        let e = flow - predicted - disparity_jacobian * (measured[0] - d);
         let pick = SMatrix::<f64, 3, 4>::new(
-            -by_d.x, 1.0, 0.0, 0.0, //
-            -by_d.y, 0.0, 1.0, 0.0, //
-            -by_d.z, 1.0, 0.0, -1.0,
+            -disparity_jacobian.x,
+            1.0,
+            0.0,
+            0.0, //
+            -disparity_jacobian.y,
+            0.0,
+            1.0,
+            0.0, //
+            -disparity_jacobian.z,
+            1.0,
+            0.0,
+            -1.0,
         );
         let gain: Vector3<f64> = pick * self.measured.cov * Vector4::x();
         let cov = pick * self.measured.cov * pick.transpose();
         let inverse_cov = inverse(&cov)?;
-        let shift = -gain.dot(&(inverse_cov * misclosure));
+        let shift = -gain.dot(&(inverse_cov * e));
         let improved = measured[0] + shift * restraint(shift * shift / self.measured.cov[(0, 0)]);
-        if improved > 0.1 * d {
+        if improved > LEAST_DISPARITY_SHARE * d {
             s.z = improved;
         }
-        let by_motion = at.rig.velocity_jacobian(&Vector3::new(x, y, d));
-        let (x, y, right) = (wave(measured[1]), wave(measured[2]), wave(measured[3]));
-        let by_phase = Matrix3::from_data(ArrayStorage([[x, 0.0, x], [0.0, y, 0.0], [0.0, 0.0, -right]]));
-        Some(Linearised { misclosure, inverse_cov, by_motion, by_offset: -by_d, by_phase })
+        let motion_jacobian = at.rig.velocity_jacobian(&Vector3::new(x, y, d));
+        let (x, y, right) = (phase_wave(measured[1]), phase_wave(measured[2]), phase_wave(measured[3]));
+        let phase_jacobian =
+            Matrix3::from_data(ArrayStorage([[x, 0.0, x], [0.0, y, 0.0], [0.0, 0.0, -right]]));
+        Some(Misclosure {
+            e,
+            inverse_cov,
+            motion_jacobian,
+            offset_jacobian: -disparity_jacobian,
+            phase_jacobian,
+        })
     }
 
     /// Velocities add up.
-    fn by_phi(_: &At<'_>) -> Matrix6<f64> {
+    fn small_motion_jacobian(_: &LinearisationPoint<'_>) -> Matrix6<f64> {
         Matrix6::identity()
     }
-
-    fn sums(
-        observations: &[Self],
-        structures: &mut [Vector3<f64>],
-        at: &At<'_>,
-        weighing: &Weighing<'_>,
-    ) -> Vec<(usize, Step)> {
-        step::of_flows(observations, structures, at, weighing)
-    }
-}
-
-/// q of every observation in front of the camera, with the structure held at its measured value (the Sampson form).
-pub(super) fn squares<M: Measurement>(observations: &[M], at: &At<'_>) -> Vec<f64> {
-    let square = |o: &M| {
-        let l = o.linearise(&mut o.structure(), at)?;
-        Some(l.misclosure.dot(&(l.inverse_cov * l.misclosure)))
-    };
-    observations.iter().filter_map(square).collect()
-}
-
-/// The median of q at a motion; infinite without observations.
-pub(super) fn median_square<M: Measurement>(phi: &Twist, sample: &[M], rig: &StereoRig) -> f64 {
-    let middle = median(&mut squares(sample, &At::new(*phi, rig)));
-    if middle.is_nan() { f64::INFINITY } else { middle }
 }

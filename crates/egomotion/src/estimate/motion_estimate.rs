@@ -1,0 +1,100 @@
+//! The answer of every estimator: θ̂ with its covariance, and which of it was observed.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use super::certainty::covariance::with_unobserved;
+use super::certainty::undetermined::UndeterminedDirections;
+use super::serde_array;
+use super::unsolvable::Unsolvable;
+use crate::geometry::{Gaussian, Twist};
+
+/// The answer of an estimator of N unknowns.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Estimate<const N: usize> {
+    /// θ̂ and its covariance; an unobserved component has value 0 and an infinite variance.
+    pub theta: Gaussian<N>,
+    /// Which components are determined by the data.
+    #[serde(with = "serde_array")]
+    pub observed: [bool; N],
+    /// The directions that are not; for φ, what they are in words.
+    pub undetermined: UndeterminedDirections<N>,
+    /// Number of rows (or observations) that went in.
+    pub rows: usize,
+    /// Number of rows that the estimator kept as inliers.
+    pub inliers: usize,
+    /// Scale of the residuals: in units of each row's σ where rows are weighted, else in the rows' own unit.
+    pub residual_scale: f64,
+}
+
+/// φ of the left camera with its covariance, order (tX, tY, tZ, ΩX, ΩY, ΩZ), metres and radians per interval.
+pub type MotionEstimate = Estimate<6>;
+
+impl<const N: usize> Estimate<N> {
+    /// Whether every component is determined.
+    pub fn is_complete(&self) -> bool {
+        self.observed.iter().all(|&o| o)
+    }
+}
+
+impl MotionEstimate {
+    /// φ̂.
+    pub fn phi(&self) -> Twist {
+        Twist::from_vector(&self.theta.mean)
+    }
+
+    /// How far φ̂ is from another motion, in standard deviations of the component that is furthest.
+    pub(crate) fn moved_from(&self, other: &Twist) -> f64 {
+        let step = self.theta.mean - other.vector();
+        (0..6).map(|i| (step[i] / self.theta.sigma(i)).abs()).fold(0.0, f64::max)
+    }
+
+    /// The estimate with its components of unbounded variance marked as unobserved: mean 0 and variance infinite.
+    ///
+    /// # Errors
+    /// [`Unsolvable::Unobservable`] when none is left.
+    pub fn with_unbounded_unobserved(mut self) -> Result<Self, Unsolvable> {
+        for i in 0..6 {
+            if self.observed[i] && !self.theta.cov[(i, i)].is_finite() {
+                self.observed[i] = false;
+                self.undetermined = self.undetermined.with_components([i]);
+            }
+            if !self.observed[i] {
+                self.theta.mean[i] = 0.0;
+            }
+        }
+        let any = self.observed.contains(&true);
+        self.theta.cov = with_unobserved(self.theta.cov, &self.observed);
+        if any { Ok(self) } else { Err(Unsolvable::Unobservable) }
+    }
+
+    /// The same motion and covariance seen by a parallel camera centred at `centre`, equation (4).
+    pub fn seen_from(&self, centre: &Vector3<f64>) -> Self {
+        let matrix = Twist::seen_from_matrix(centre);
+        let theta = self.theta.propagate(matrix * self.theta.mean, &matrix);
+        Self { theta, undetermined: self.undetermined.transformed(&matrix), ..*self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_no_finite_variance_is_not_observed() {
+        let estimate = |variances: [f64; 6]| Estimate {
+            theta: Gaussian::independent([1.0; 6], variances),
+            observed: [true; 6],
+            undetermined: UndeterminedDirections::default(),
+            rows: 10,
+            inliers: 10,
+            residual_scale: 1.0,
+        };
+        let known =
+            estimate([1.0, f64::INFINITY, 1.0, 1.0, f64::NAN, 1.0]).with_unbounded_unobserved().unwrap();
+        assert_eq!(known.observed, [true, false, true, true, false, true]);
+        assert_eq!(known.theta.mean.as_slice(), &[1.0, 0.0, 1.0, 1.0, 0.0, 1.0]);
+        assert_eq!(known.theta.cov[(4, 4)], f64::INFINITY);
+        assert_eq!(estimate([f64::INFINITY; 6]).with_unbounded_unobserved(), Err(Unsolvable::Unobservable));
+    }
+}
