@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 use egomotion::estimate;
-use egomotion_io::ChoiceError;
+use egomotion_io::OptionsError;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
@@ -27,9 +27,9 @@ pub fn value(error: impl Display) -> PyErr {
 }
 
 /// A choice that has no meaning is a wrong value.
-pub fn choice(error: ChoiceError) -> PyErr {
+pub fn choice(error: OptionsError) -> PyErr {
     match error {
-        ChoiceError::Choice(words) => value(words),
-        ChoiceError::File(error) => read(error),
+        OptionsError::Invalid(words) => value(words),
+        OptionsError::File(error) => read(error),
     }
 }

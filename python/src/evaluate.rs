@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use egomotion::metrics::TrajectoryAlignment;
-use egomotion_io::evaluation::{Evaluation, Options};
+use egomotion_io::evaluation::{Evaluation, EvaluationOptions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -31,7 +31,7 @@ pub fn evaluate(
     delta: Option<Vec<String>>,
     truth_sigma: Option<(f64, f64)>,
 ) -> PyResult<Py<PyAny>> {
-    let own = Options::default();
+    let own = EvaluationOptions::default();
     let known = [TrajectoryAlignment::None, TrajectoryAlignment::Se3, TrajectoryAlignment::Sim3];
     let alignment = known.into_iter().find(|known| known.name() == align);
     let by_time = match associate {
@@ -60,7 +60,7 @@ pub fn evaluate(
     }
     let (t, degrees) = truth_sigma.unwrap_or_default();
     let r = degrees.to_radians();
-    let options = Options {
+    let options = EvaluationOptions {
         format: None,
         by_time,
         largest_gap_s: max_diff,

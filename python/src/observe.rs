@@ -4,7 +4,7 @@ use egomotion::geometry::Twist;
 use egomotion::observe::tracks::{Hints, stereo_tracks};
 use egomotion::observe::{DisparityMap, DisparityMatcher, FlowField, Pyramid, StereoPyramid, dense_flow};
 use egomotion::pipeline::Config;
-use egomotion_io::given;
+use egomotion_io::precomputed;
 use numpy::PyArray3;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -28,7 +28,7 @@ pub fn given_map(
         };
     };
     let shift = arrays::field("disparity", shift)?;
-    let Some(sigma) = sigma else { return Ok(Some(DisparityMap::given(shift, |_| given::SIGMA_PX))) };
+    let Some(sigma) = sigma else { return Ok(Some(DisparityMap::given(shift, |_| precomputed::SIGMA_PX))) };
     let sigma = arrays::field("disparity_sigma", sigma)?;
     if sigma.size() != shift.size() {
         return Err(error::value("disparity and disparity_sigma differ in size"));
@@ -48,7 +48,7 @@ pub fn given_flow(
         };
     };
     let [u, v] = arrays::fields("flow", flow)?;
-    let found = FlowField::given(u, v, given::SIGMA_PX);
+    let found = FlowField::given(u, v, precomputed::SIGMA_PX);
     let Some(covariance) = covariance else { return Ok(Some(found)) };
     let planes = arrays::fields::<3>("flow_covariance", covariance)?;
     if planes[0].size() != found.size() {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use egomotion_io::simulated::{Options, SequenceFolder, World};
+use egomotion_io::simulation::{SequenceFolder, Simulation, SimulationOptions};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 
@@ -34,17 +34,18 @@ pub fn simulate(
         return Err(error::value("frames must be 2 to 1000000"));
     }
     let (seed, texture) = (seed.map(u64::from), texture.map(u64::from));
-    let options = Options { sequence: name, step, frames, size_px: size, noise, seed, texture, scene };
-    let world = py.detach(|| World::of(&options)).map_err(error::choice)?;
-    for warning in &world.warnings {
+    let options =
+        SimulationOptions { sequence: name, step, frames, size_px: size, noise, seed, texture, scene };
+    let simulation = py.detach(|| Simulation::new(&options)).map_err(error::choice)?;
+    for warning in &simulation.warnings {
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &std::ffi::CString::new(warning.as_str())?, 1)?;
     }
-    let folder = SequenceFolder::create(&out, world.frames).map_err(error::read)?;
-    folder.write_scene(&world).map_err(error::read)?;
-    for k in 0..world.frames {
-        py.detach(|| folder.write_frame(&world, k)).map_err(error::read)?;
+    let folder = SequenceFolder::create(&out, simulation.frames).map_err(error::read)?;
+    folder.write_scene(&simulation).map_err(error::read)?;
+    for k in 0..simulation.frames {
+        py.detach(|| folder.write_frame(&simulation, k)).map_err(error::read)?;
         py.check_signals()?;
     }
-    folder.write_course(&world, world.frames).map_err(error::read)?;
-    Ok(world.frames)
+    folder.write_course(&simulation, simulation.frames).map_err(error::read)?;
+    Ok(simulation.frames)
 }

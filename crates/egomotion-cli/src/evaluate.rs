@@ -4,7 +4,7 @@ use std::io::Write as _;
 
 use anyhow::Result;
 use egomotion::metrics::TrajectoryAlignment;
-use egomotion_io::evaluation::{Evaluation, Options, Stated};
+use egomotion_io::evaluation::{Evaluation, EvaluationOptions, Stated};
 
 use crate::args::EvaluateArgs;
 use crate::terminal::{self, tell};
@@ -29,7 +29,7 @@ pub fn evaluate(args: &EvaluateArgs) -> Result<Ending> {
     Ok(Ending::Done)
 }
 
-fn text(found: &Evaluation, options: &Options) -> String {
+fn text(found: &Evaluation, options: &EvaluationOptions) -> String {
     let mut text = format!("{} poses, associated by {}\n", found.poses, found.associated_by);
     let step = &found.step;
     text += &format!(

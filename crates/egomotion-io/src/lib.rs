@@ -20,34 +20,24 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod calibration;
-pub mod depth;
-pub mod disparity_png;
-pub mod error;
+mod error;
 pub mod evaluation;
-pub mod flo;
-pub mod flow_png;
-pub mod given;
 pub mod image;
-#[cfg(feature = "parquet")]
-pub mod motion_parquet;
-pub mod motion_table;
-pub mod npy;
-pub mod npz;
-pub mod pfm;
-pub mod ply;
-mod raster;
+mod maps;
 pub mod read;
 pub mod recording;
-pub mod simulated;
+pub mod simulation;
 pub mod source;
-pub mod stream;
-pub mod tracks;
-pub mod trajectory;
-pub mod undistort;
+mod tables;
 pub mod write;
 
-pub use error::{ChoiceError, IoError};
+pub use error::{IoError, OptionsError};
+pub use image::stream;
+pub use maps::{depth, disparity_png, flo, flow_png, npy, npz, pfm, ply, precomputed};
 pub use source::Source;
+#[cfg(feature = "parquet")]
+pub use tables::motion_parquet;
+pub use tables::{motion_table, tracks, trajectory};
 
 /// The examples of the README, compiled with the doc tests; here because they need both libraries.
 #[cfg(doctest)]

@@ -50,7 +50,9 @@ pub fn sweep(path: &Path) -> Result<(), IoError> {
         };
         for entry in entries {
             let entry = entry?;
-            if entry.file_name().to_string_lossy().starts_with(TEMPORARY) && entry.file_type()?.is_file() {
+            if entry.file_name().to_string_lossy().starts_with(TEMPORARY_PREFIX)
+                && entry.file_type()?.is_file()
+            {
                 fs::remove_file(entry.path())?;
             }
         }
@@ -68,12 +70,12 @@ pub fn folder(path: &Path) -> Result<(), IoError> {
 }
 
 /// How the names of unfinished files begin.
-const TEMPORARY: &str = ".egomotion-";
+const TEMPORARY_PREFIX: &str = ".egomotion-";
 
 fn temporary_beside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = Builder::new();
-    builder.prefix(TEMPORARY);
+    builder.prefix(TEMPORARY_PREFIX);
     // A temporary file is private by default; a result is as readable as any file of this user.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use egomotion::geometry::{Distortion, RigidMotion};
 
-use super::camera::{CameraModel, RawPair, coefficients, distortion, list, sixteen, size};
+use super::camera::{CameraModel, RawPair, coefficients, comma_separated, distortion, row_major_4x4, size};
 use super::document::{Document, Entry};
 use crate::{IoError, read, write};
 
@@ -71,9 +71,9 @@ pub fn write(path: &Path, camera: &CameraModel, body_from_camera: &RigidMotion) 
     let text = format!(
         "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n{size}camera_model: pinhole\n\
          intrinsics: [{}]\ndistortion_model: {model}\ndistortion_coefficients: [{}]\n",
-        list(&sixteen(body_from_camera)),
-        list(&[fx, fy, cx, cy]),
-        list(&coefficients(&camera.distortion)),
+        comma_separated(&row_major_4x4(body_from_camera)),
+        comma_separated(&[fx, fy, cx, cy]),
+        comma_separated(&coefficients(&camera.distortion)),
     );
     write::bytes(path, text.as_bytes())
 }

@@ -14,15 +14,15 @@ use egomotion::metrics::{
 use serde_json::{Value, json};
 
 use crate::IoError;
-use crate::trajectory::Format;
+use crate::tables::trajectory::TrajectoryFormat;
 pub use stated::Stated;
 use trajectories::Compared;
 
 /// How trajectories are compared.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Options {
-    /// Format of both files; `None` is told by their rows.
-    pub format: Option<Format>,
+pub struct EvaluationOptions {
+    /// TrajectoryFormat of both files; `None` is told by their rows.
+    pub format: Option<TrajectoryFormat>,
     /// Whether poses belong to each other by their time stamps, where both have them, or row by row.
     pub by_time: bool,
     /// Time stamps farther apart than this do not belong to each other, in seconds.
@@ -37,7 +37,7 @@ pub struct Options {
     pub truth_sigma: [f64; 6],
 }
 
-impl Default for Options {
+impl Default for EvaluationOptions {
     /// Those of the command: by time, laid over the truth, relative motions over a second and a metre.
     fn default() -> Self {
         Self {
@@ -95,7 +95,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// A file cannot be read, or fewer than two poses belong to each other.
-    pub fn of(estimate: &Path, truth: &Path, options: &Options) -> Result<Self, IoError> {
+    pub fn of(estimate: &Path, truth: &Path, options: &EvaluationOptions) -> Result<Self, IoError> {
         let compared = Compared::read(estimate, truth, options)?;
         let mut warnings: Vec<String> = compared.warning.iter().cloned().collect();
         let (mut alignment, true_poses) = (options.alignment, &compared.truth);
