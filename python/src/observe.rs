@@ -28,7 +28,7 @@ pub fn given_map(
         };
     };
     let shift = arrays::field("disparity", shift)?;
-    let Some(sigma) = sigma else { return Ok(Some(DisparityMap::given(shift, |_| precomputed::SIGMA_PX))) };
+    let Some(sigma) = sigma else { return Ok(Some(DisparityMap::given(shift, |_| precomputed::DEFAULT_SIGMA_PX))) };
     let sigma = arrays::field("disparity_sigma", sigma)?;
     if sigma.size() != shift.size() {
         return Err(error::value("disparity and disparity_sigma differ in size"));
@@ -48,7 +48,7 @@ pub fn given_flow(
         };
     };
     let [u, v] = arrays::fields("flow", flow)?;
-    let found = FlowField::given(u, v, precomputed::SIGMA_PX);
+    let found = FlowField::given(u, v, precomputed::DEFAULT_SIGMA_PX);
     let Some(covariance) = covariance else { return Ok(Some(found)) };
     let planes = arrays::fields::<3>("flow_covariance", covariance)?;
     if planes[0].size() != found.size() {

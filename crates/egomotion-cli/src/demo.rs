@@ -18,7 +18,7 @@ use crate::run::set_threads;
 use crate::session::{Outcome, Row, Session, progress, stop_signal};
 use crate::summary::Summary;
 use crate::terminal;
-use egomotion_io::recording::{SourceFrame, FrameInput};
+use egomotion_io::recording::{FrameInput, SourceFrame};
 use egomotion_report::run::Eyes;
 
 /// Rays along each side of a pixel that shows an edge.

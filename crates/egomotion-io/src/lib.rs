@@ -1,5 +1,12 @@
 //! Images, datasets, calibration files, trajectories and maps for `egomotion`.
 //!
+//! | kind | modules |
+//! |---|---|
+//! | recordings | [`source`] (dataset layouts), [`calibration`], [`recording`] (frames for a pipeline), [`stream`] (images end to end) |
+//! | images and maps | [`image`], [`depth`], [`disparity_png`], [`flow_png`], [`pfm`], [`flo`], [`npy`], [`ply`], [`precomputed`] |
+//! | tables | [`motion_table`], [`trajectory`], [`tracks`] |
+//! | whole tasks | [`simulation`] (a rendered sequence as a folder), [`evaluation`] (a trajectory against the truth) |
+//!
 //! Every reader comes twice: `read` takes a path, `decode` (or `parse`) takes what was read, so
 //! that it also serves streams. No reader panics or allocates without bound on any input, and each
 //! error is one line that names the file, the reason and what to do ([`IoError`]).
@@ -33,7 +40,7 @@ pub mod write;
 
 pub use error::{IoError, OptionsError};
 pub use image::stream;
-pub use maps::{depth, disparity_png, flo, flow_png, npy, npz, pfm, ply, precomputed};
+pub use maps::{depth, disparity_png, flo, flow_png, npy, pfm, ply, precomputed};
 pub use source::Source;
 #[cfg(feature = "parquet")]
 pub use tables::motion_parquet;

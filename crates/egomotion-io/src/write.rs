@@ -8,7 +8,10 @@ use tempfile::{Builder, NamedTempFile};
 
 use crate::IoError;
 
-/// Write a whole file at once, replacing one of the same name; see [`atomically`].
+/// How the names of unfinished files begin, by which [`sweep`] knows them.
+const TEMPORARY_PREFIX: &str = ".egomotion-";
+
+/// Write a whole file at once, replacing one of the same name; it appears complete or not at all.
 ///
 /// # Errors
 /// Names the file: its folder is missing or not writable, the disk is full, a folder has its name.
@@ -23,7 +26,7 @@ pub fn bytes(path: &Path, content: &[u8]) -> Result<(), IoError> {
 ///
 /// # Errors
 /// Names the file: its folder is missing or not writable, the disk is full, a folder has its name.
-pub fn atomically(
+pub(crate) fn atomically(
     path: &Path,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), IoError> {
@@ -68,9 +71,6 @@ pub fn sweep(path: &Path) -> Result<(), IoError> {
 pub fn folder(path: &Path) -> Result<(), IoError> {
     fs::create_dir_all(path).map_err(|error| IoError::system(path, "make the folder", &error))
 }
-
-/// How the names of unfinished files begin.
-const TEMPORARY_PREFIX: &str = ".egomotion-";
 
 fn temporary_beside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -10,7 +10,7 @@ use egomotion::observe::{RectificationMap, Rectifier};
 use egomotion::pipeline::{Config, Frame, StereoFrame, Unanswered};
 use egomotion_io::IoError;
 use egomotion_io::calibration::{self, CameraPair};
-use egomotion_io::recording::{SourceFrame, FrameInput, halves, unseen};
+use egomotion_io::recording::{FrameInput, SourceFrame, halves, unseen};
 use egomotion_io::stream::{ImageStream, StreamFormat};
 use serde_json::{Value, json};
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::{Result, anyhow};
 use egomotion::geometry::{Image, RigidMotion, Twist};
 use egomotion::pipeline::{FrameMotion, Observe, Trajectory};
-use egomotion_io::recording::{SourceFrame, FrameInput, Pipeline};
+use egomotion_io::recording::{FrameInput, Pipeline, SourceFrame};
 
 use super::log::{DoneFrame, Log, Picture};
 use super::tally::Tally;

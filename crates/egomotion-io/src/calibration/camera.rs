@@ -5,6 +5,9 @@ use egomotion::geometry::{Camera, Distortion, RigidMotion, StereoRectification};
 use super::document::Entry;
 use crate::IoError;
 
+/// Longest baseline that is taken for metres: a longer one is a calibration in millimetres.
+const LARGEST_BASELINE_M: f64 = 20.0;
+
 /// One camera as a file describes it: the image size is often not in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraModel {
@@ -30,9 +33,6 @@ pub struct RawPair {
     /// Pose of the left camera in the frame of the body that carries it (EuRoC's T_BS), where the file has it.
     pub body_from_left: Option<RigidMotion>,
 }
-
-/// A greater distance between two cameras must be in other units than metres.
-const LARGEST_BASELINE_M: f64 = 20.0;
 
 impl RawPair {
     /// The rectification of the pair for images of `size`, which the file's own size must be, if it has one.

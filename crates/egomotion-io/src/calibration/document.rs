@@ -38,7 +38,7 @@ pub(super) struct Entry<'a> {
     node: &'a Node,
 }
 
-/// Lists, maps and elements may be nested so deep.
+/// How deep lists, maps and elements may be nested: a bound on the stack; calibrations need four or five levels.
 const MAX_NESTING: usize = 32;
 
 impl Document {

@@ -12,7 +12,7 @@ use crate::{IoError, read, write};
 ///
 /// # Errors
 /// The file cannot be read, or names the line and key that is missing or wrong.
-pub fn read(path: &Path) -> Result<(CameraModel, RigidMotion), IoError> {
+pub(crate) fn read(path: &Path) -> Result<(CameraModel, RigidMotion), IoError> {
     parse(&read::text(path)?, path)
 }
 
@@ -28,7 +28,7 @@ pub fn parse(text: &str, path: &Path) -> Result<(CameraModel, RigidMotion), IoEr
 ///
 /// # Errors
 /// As [`read()`].
-pub fn read_pair(left: &Path, right: &Path) -> Result<RawPair, IoError> {
+pub(crate) fn read_pair(left: &Path, right: &Path) -> Result<RawPair, IoError> {
     let ((left, body_from_left), (right, body_from_right)) = (read(left)?, read(right)?);
     let right_from_left = body_from_right.inverse().after(&body_from_left);
     Ok(RawPair { left, right, right_from_left, body_from_left: Some(body_from_left) })

@@ -12,7 +12,7 @@ use crate::{IoError, read, write};
 ///
 /// # Errors
 /// The file cannot be read, or names the line and key that is missing or wrong.
-pub fn read(path: &Path) -> Result<RawPair, IoError> {
+pub(crate) fn read(path: &Path) -> Result<RawPair, IoError> {
     parse(&read::text(path)?, path)
 }
 

@@ -1,10 +1,10 @@
 //! Calibration files of stereo pairs, one module a format; [`read()`] recognises which.
 
-pub mod camera;
+mod camera;
 mod document;
 pub mod euroc;
 pub mod kalibr;
-pub mod kitti;
+pub(crate) mod kitti;
 pub mod opencv;
 pub mod rig;
 pub mod ros;
@@ -15,7 +15,7 @@ use std::path::Path;
 use egomotion::geometry::{StereoRectification, StereoRig};
 
 pub use camera::{CameraModel, RawPair};
-pub use kitti::{Calibration, CameraPair, write};
+pub use kitti::{CameraPair, KittiCalibration};
 
 use crate::{IoError, read};
 use document::Document;
@@ -26,7 +26,7 @@ use document::Document;
 #[derive(Debug, Clone, PartialEq)]
 pub enum StereoCalibration {
     /// KITTI's projections of rectified images, of a grey pair, a colour pair or both.
-    Kitti(Calibration),
+    Kitti(KittiCalibration),
     /// The rig of rectified images; of size 0×0 where the file does not tell it.
     Rectified(StereoRig),
     /// Two cameras as they are: their images must be rectified.
@@ -54,7 +54,7 @@ enum CalibrationFormat {
     Rig,
 }
 
-/// For messages.
+/// The formats in words, for the errors of a file that has none of them.
 const KNOWN_FORMATS: &str = "give KITTI's calib.txt or calib_cam_to_cam.txt, EuRoC's sensor.yaml, a Kalibr camchain, OpenCV's stereo \
                      YAML or XML (M1 D1 M2 D2 R T), ROS CameraInfo (left.yaml, right.yaml) or a rig.toml";
 
@@ -86,7 +86,7 @@ pub fn parse(text: &str, path: &Path) -> Result<StereoCalibration, IoError> {
     let document = document.unwrap_or_else(Document::empty);
     let root = document.root(path);
     match format {
-        CalibrationFormat::Kitti => Calibration::parse(text, path).map(StereoCalibration::Kitti),
+        CalibrationFormat::Kitti => KittiCalibration::parse(text, path).map(StereoCalibration::Kitti),
         CalibrationFormat::Rig => rig::parse(text, path),
         CalibrationFormat::OpenCv => opencv::pair(&root, path).map(StereoCalibration::Raw),
         CalibrationFormat::Kalibr => kalibr::pair(&root).map(StereoCalibration::Raw),

@@ -11,7 +11,7 @@ use super::camera::{CameraModel, RawPair, coefficients, comma_separated, distort
 use super::document::{Document, Entry};
 use crate::{IoError, read, write};
 
-/// Names of the left and right camera's matrix and distortion, and of the pose.
+/// Keys of the left and of the right camera's matrix, in the order in which they are looked for.
 const MATRIX_KEYS: [&[&str]; 2] = [
     &[
         "M1",
@@ -32,12 +32,16 @@ const MATRIX_KEYS: [&[&str]; 2] = [
         "right_camera_matrix",
     ],
 ];
+/// Keys of the left and of the right camera's distortion coefficients.
 const DISTORTION_KEYS: [&[&str]; 2] = [
     &["D1", "distCoeffs1", "dist_coeffs_1", "dist_coeffs1", "distortion_coefficients_1", "dist_coeffs_left"],
     &["D2", "distCoeffs2", "dist_coeffs_2", "dist_coeffs2", "distortion_coefficients_2", "dist_coeffs_right"],
 ];
+/// Keys of the rotation from the left camera's frame to the right one's.
 const ROTATION_KEYS: &[&str] = &["R", "rotation_matrix"];
+/// Keys of the translation that goes with it.
 const TRANSLATION_KEYS: &[&str] = &["T", "t", "translation_vector"];
+/// Keys of the distortion model's name.
 const MODEL_KEYS: &[&str] = &["distortion_model", "camera_model"];
 
 /// The pair of a file, or of its sister (see the module).

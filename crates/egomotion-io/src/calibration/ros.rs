@@ -84,7 +84,7 @@ pub(super) fn partners(path: &Path) -> Result<(PathBuf, PathBuf), IoError> {
 ///
 /// # Errors
 /// As [`read()`]; and what of the two does not fit together.
-pub fn read_pair(left: &Path, right: &Path) -> Result<StereoCalibration, IoError> {
+pub(super) fn read_pair(left: &Path, right: &Path) -> Result<StereoCalibration, IoError> {
     let (l, r) = (read(left)?, read(right)?);
     let p = &r.projection;
     let refuse =

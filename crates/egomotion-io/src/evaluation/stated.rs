@@ -13,14 +13,14 @@ use crate::tables::motion_table::{self, MotionRow};
 
 /// NEES and coverage of φ.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stated {
+pub struct StatedUncertainty {
     /// Over whole motions.
     pub nees: Nees,
     /// Of the components' 95 % intervals.
     pub components: Coverage,
 }
 
-impl Stated {
+impl StatedUncertainty {
     /// `None` where the estimate is not the folder of a run, or the truth has no time stamps.
     pub(super) fn read(
         estimate: &Path,

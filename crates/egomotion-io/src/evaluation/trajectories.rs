@@ -11,7 +11,7 @@ use crate::source::{FrameFiles, Source};
 use crate::tables::trajectory::{self, Pose, TrajectoryFormat};
 
 /// Poses that belong to each other.
-pub struct Compared {
+pub(super) struct Compared {
     pub estimate: Vec<RigidMotion>,
     pub truth: Vec<RigidMotion>,
     /// Time stamps of the truth, where it has them.
@@ -23,7 +23,7 @@ pub struct Compared {
 }
 
 impl Compared {
-    pub fn read(
+    pub(super) fn read(
         estimate_path: &Path,
         truth_path: &Path,
         options: &EvaluationOptions,
@@ -69,7 +69,7 @@ fn times(poses: &[Pose]) -> Option<Vec<f64>> {
 }
 
 /// A trajectory file, the folder of a run, or a recording with true poses.
-pub fn poses(path: &Path, format: Option<TrajectoryFormat>) -> Result<Vec<Pose>, IoError> {
+pub(super) fn poses(path: &Path, format: Option<TrajectoryFormat>) -> Result<Vec<Pose>, IoError> {
     if !path.is_dir() {
         return trajectory::read(path, format);
     }

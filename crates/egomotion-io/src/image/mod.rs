@@ -35,7 +35,7 @@ pub fn luma([red, green, blue]: [f32; 3]) -> f32 {
 }
 
 /// Whether a file's name ends like that of an image.
-pub fn has_image_extension(path: &Path) -> bool {
+pub(crate) fn has_image_extension(path: &Path) -> bool {
     let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
     ending.is_some_and(|ending| EXTENSIONS.contains(&&*ending))
 }

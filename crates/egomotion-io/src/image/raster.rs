@@ -18,7 +18,7 @@ pub(crate) struct Raster {
 
 impl Raster {
     /// A PNG's samples; palettes and less than 8 bits become 8 bits, everything else stays as it is.
-    pub fn decode(content: &[u8], path: &Path) -> Result<Self, IoError> {
+    pub(crate) fn decode(content: &[u8], path: &Path) -> Result<Self, IoError> {
         let failed = |error: png::DecodingError| broken(path, &error);
         let mut decoder = Decoder::new(Cursor::new(content));
         decoder.set_ignore_text_chunk(true);
@@ -39,18 +39,18 @@ impl Raster {
     }
 
     /// Samples of one pixel.
-    pub fn channels(&self) -> usize {
+    pub(crate) fn channels(&self) -> usize {
         self.colour.samples()
     }
 
     /// The samples as 16-bit numbers, if the file has 16 bits.
-    pub fn wide(&self) -> Option<impl Iterator<Item = u16>> {
+    pub(crate) fn wide(&self) -> Option<impl Iterator<Item = u16>> {
         let pairs = self.samples.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]]));
         (self.depth == BitDepth::Sixteen).then_some(pairs)
     }
 
     /// Write as a PNG that appears whole or not at all.
-    pub fn write(&self, path: &Path) -> Result<(), IoError> {
+    pub(crate) fn write(&self, path: &Path) -> Result<(), IoError> {
         let encoded = self.encode().map_err(|error| {
             IoError::new(path, format_args!("cannot be encoded: {error}"), "give an image that is not empty")
         })?;

@@ -12,7 +12,7 @@ fn shown(camera: &Camera, u: usize, v: usize) -> Option<(f64, f64)> {
 }
 
 /// The pinhole's image, bicubic; beyond the border the border is repeated, and what the lens model does not reach is black.
-pub fn image(camera: &Camera, image: &Image) -> Image {
+pub(crate) fn image(camera: &Camera, image: &Image) -> Image {
     let (width, height) = image.size();
     let (last_u, last_v) = (width.saturating_sub(1) as f64, height.saturating_sub(1) as f64);
     let level = |(u, v): (f64, f64)| cubic(image, u.clamp(0.0, last_u), v.clamp(0.0, last_v));
@@ -20,7 +20,7 @@ pub fn image(camera: &Camera, image: &Image) -> Image {
 }
 
 /// The pinhole's depth: that of the nearest pixel, for nothing lies between two surfaces; missing beyond the border.
-pub fn depth(camera: &Camera, depth: &Field) -> Field {
+pub(crate) fn depth(camera: &Camera, depth: &Field) -> Field {
     let (width, height) = depth.size();
     let inside = |c: f64, n: usize| c > -0.5 && c < n as f64 - 0.5;
     let nearest = |(u, v): (f64, f64)| {

@@ -8,7 +8,7 @@ use png::{BitDepth, ColorType};
 use crate::image::raster::Raster;
 use crate::{IoError, read};
 
-/// Levels for each pixel of disparity.
+/// Levels for each pixel of disparity, by KITTI's definition of the format.
 const LEVELS_PER_PX: f32 = 256.0;
 
 /// A disparity map, in pixels.

@@ -9,7 +9,7 @@ use crate::{IoError, read, write};
 /// The number every `.flo` starts with; its bytes read "PIEH".
 const MAGIC: f32 = 202021.25;
 
-/// Magnitudes beyond this are unknown flow.
+/// Largest magnitude of a known component in pixels, by the format's definition: larger ones mark unknown flow.
 const MAX_KNOWN_FLOW_PX: f32 = 1e9;
 
 /// A flow map, (vx, vy) in pixels; a pixel with NaN or more than 10⁹ px in one component is missing.

@@ -8,8 +8,9 @@ use png::{BitDepth, ColorType};
 use crate::image::raster::Raster;
 use crate::{IoError, read};
 
-/// Levels for each pixel of flow, and the level of no flow.
+/// Levels for each pixel of flow, by KITTI's definition of the format.
 const LEVELS_PER_PX: f32 = 64.0;
+/// The level of no flow, by the same definition.
 const LEVEL_OF_NO_FLOW: f32 = 32768.0;
 
 /// A flow map, (vx, vy) in pixels.

@@ -5,7 +5,7 @@ pub mod disparity_png;
 pub mod flo;
 pub mod flow_png;
 pub mod npy;
-pub mod npz;
+pub(crate) mod npz;
 pub mod pfm;
 pub mod ply;
 pub mod precomputed;

@@ -17,7 +17,7 @@ pub struct Array {
     pub values: Vec<f64>,
 }
 
-/// The longest header that is looked at, in bytes; NumPy's own are under 200.
+/// The longest header that is read, in bytes: a bound on memory; NumPy's own are under 200.
 const MAX_HEADER_BYTES: usize = 1 << 16;
 
 /// What every `.npy` starts with.

@@ -9,11 +9,11 @@ use zip::ZipArchive;
 use crate::maps::npy::{self, Array};
 use crate::{IoError, read};
 
-/// The largest array that is unpacked, in bytes.
+/// The largest array that is unpacked, in bytes (1 GiB): a bound on memory, whatever the archive promises.
 const MAX_ARRAY_BYTES: u64 = 1 << 30;
 
 /// The arrays of an `.npz`, read one by one.
-pub struct Npz<'a> {
+pub(crate) struct Npz<'a> {
     archive: ZipArchive<Cursor<&'a [u8]>>,
     path: &'a Path,
 }
@@ -23,7 +23,7 @@ impl<'a> Npz<'a> {
     ///
     /// # Errors
     /// The content is no zip archive.
-    pub fn open(content: &'a [u8], path: &'a Path) -> Result<Self, IoError> {
+    pub(crate) fn open(content: &'a [u8], path: &'a Path) -> Result<Self, IoError> {
         let archive = ZipArchive::new(Cursor::new(content)).map_err(|error| {
             let reason = format!("is not a whole .npz file: {error}");
             IoError::new(path, reason, "give arrays written by np.savez")
@@ -32,7 +32,7 @@ impl<'a> Npz<'a> {
     }
 
     /// Whether there is an array of this name.
-    pub fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.archive.index_for_name(&format!("{name}.npy")).is_some()
     }
 
@@ -40,7 +40,7 @@ impl<'a> Npz<'a> {
     ///
     /// # Errors
     /// There is none, it is damaged, larger than 1 GiB, or no array of numbers.
-    pub fn array(&mut self, name: &str) -> Result<Array, IoError> {
+    pub(crate) fn array(&mut self, name: &str) -> Result<Array, IoError> {
         let refuse = |reason: String| IoError::new(self.path, reason, "give arrays written by np.savez");
         let file = self.archive.by_name(&format!("{name}.npy"));
         let file = file.map_err(|error| refuse(format!("has no array \"{name}\": {error}")))?;
@@ -59,7 +59,7 @@ impl<'a> Npz<'a> {
 ///
 /// # Errors
 /// The file cannot be read, or does not hold just one array of two axes.
-pub fn read_map(path: &Path) -> Result<Field, IoError> {
+pub(crate) fn read_map(path: &Path) -> Result<Field, IoError> {
     let content = read(path)?;
     let mut npz = Npz::open(&content, path)?;
     let names: Vec<String> =
@@ -75,6 +75,6 @@ pub fn read_map(path: &Path) -> Result<Field, IoError> {
 ///
 /// # Errors
 /// The file cannot be read.
-pub fn read(path: &Path) -> Result<Vec<u8>, IoError> {
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, IoError> {
     read::bytes(path)
 }

@@ -1,4 +1,4 @@
-//! Maps that others made: one file a frame in a folder, of any format that can be told by its name.
+//! Disparity and flow that others computed: one file for each frame in a folder, of a format that its name tells.
 
 use std::path::{Path, PathBuf};
 
@@ -7,16 +7,17 @@ use egomotion::geometry::Field;
 use crate::IoError;
 use crate::maps::{disparity_png, flo, flow_png, npy, pfm};
 
-/// Standard deviation of a given disparity or flow that comes without one, in pixels.
-pub const SIGMA_PX: f32 = 0.3;
+/// Standard deviation of precomputed disparity or flow that comes without one, in pixels. Larger values widen every
+/// interval that follows from it.
+pub const DEFAULT_SIGMA_PX: f32 = 0.3;
 
-/// Formats of a disparity map, in the order in which they are looked for.
-pub const DISPARITY_EXTENSIONS: &[&str] = &["pfm", "npy", "png"];
-/// Formats of a flow map, in the order in which they are looked for.
-pub const FLOW_EXTENSIONS: &[&str] = &["flo", "npy", "png"];
+/// File name extensions of a disparity map, in the order in which they are looked for.
+pub(crate) const DISPARITY_EXTENSIONS: &[&str] = &["pfm", "npy", "png"];
+/// File name extensions of a flow map, in the order in which they are looked for.
+pub(crate) const FLOW_EXTENSIONS: &[&str] = &["flo", "npy", "png"];
 
 /// The map of a frame in a folder: named by the stem of its image, or by its number in any width.
-pub fn find(folder: &Path, image: &Path, index: usize, extensions: &[&str]) -> Option<PathBuf> {
+pub(crate) fn find(folder: &Path, image: &Path, index: usize, extensions: &[&str]) -> Option<PathBuf> {
     let stem = image.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     let names = [stem.to_owned(), format!("{index:06}"), format!("{index:010}"), index.to_string()];
     let mut files = names
@@ -30,7 +31,7 @@ pub fn find(folder: &Path, image: &Path, index: usize, extensions: &[&str]) -> O
 ///
 /// # Errors
 /// The file cannot be read, or is no such map.
-pub fn read_disparity(path: &Path) -> Result<Field, IoError> {
+pub(crate) fn read_disparity(path: &Path) -> Result<Field, IoError> {
     match extension(path).as_str() {
         "pfm" => pfm::read(path),
         "npy" => npy::read_map(path),
@@ -43,7 +44,7 @@ pub fn read_disparity(path: &Path) -> Result<Field, IoError> {
 ///
 /// # Errors
 /// The file cannot be read, or is no such map.
-pub fn read_flow(path: &Path) -> Result<[Field; 2], IoError> {
+pub(crate) fn read_flow(path: &Path) -> Result<[Field; 2], IoError> {
     match extension(path).as_str() {
         "flo" => flo::read(path),
         "npy" => npy::read_flow(path),

@@ -52,7 +52,7 @@ impl Reader {
     }
 
     /// Read one frame; what cannot be read becomes the frame's status. The `last` frame has no flow.
-    pub fn read(&self, files: &FrameFiles, time_s: f64, last: bool) -> SourceFrame {
+    pub(super) fn read(&self, files: &FrameFiles, time_s: f64, last: bool) -> SourceFrame {
         let start = Instant::now();
         let input = match &self.tracks {
             Some(table) => {
@@ -71,7 +71,7 @@ impl Reader {
     }
 
     /// Size of all files of a frame together.
-    pub fn bytes(&self, files: &FrameFiles) -> u64 {
+    pub(super) fn bytes(&self, files: &FrameFiles) -> u64 {
         let given = [
             (&self.disparity, precomputed::DISPARITY_EXTENSIONS),
             (&self.flow, precomputed::FLOW_EXTENSIONS),
@@ -187,7 +187,7 @@ fn precomputed_disparity(folder: &Path, files: &FrameFiles) -> Result<DisparityM
         .and_then(|folder| precomputed::find(&folder, &files.left, files.index, &["pfm"]));
     Ok(match sigma {
         Some(sigma) => DisparityMap { shift, sigma: pfm::read(&sigma).map_err(bad)? },
-        None => DisparityMap::given(shift, |_| precomputed::SIGMA_PX),
+        None => DisparityMap::given(shift, |_| precomputed::DEFAULT_SIGMA_PX),
     })
 }
 
@@ -200,5 +200,5 @@ fn sigma_folder(folder: &Path) -> Option<PathBuf> {
 fn precomputed_flow(folder: &Path, files: &FrameFiles) -> Result<FlowField, Unanswered> {
     let file = precomputed::find(folder, &files.left, files.index, precomputed::FLOW_EXTENSIONS);
     let [u, v] = precomputed::read_flow(&file.ok_or(Unanswered::MissingFlow)?).map_err(bad)?;
-    Ok(FlowField::given(u, v, precomputed::SIGMA_PX))
+    Ok(FlowField::given(u, v, precomputed::DEFAULT_SIGMA_PX))
 }

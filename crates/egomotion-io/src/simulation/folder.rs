@@ -7,9 +7,10 @@ use egomotion::geometry::{Grid, RigidMotion, Twist};
 use serde::Serialize;
 
 use super::{SceneSetup, Simulation};
+use crate::calibration::kitti;
 use crate::maps::{flo, pfm};
 use crate::tables::trajectory::{Pose, write_kitti, write_tum};
-use crate::{IoError, calibration, image, write};
+use crate::{IoError, image, write};
 
 /// A folder that a rendered sequence goes to: KITTI odometry's layout, and the truth beside it.
 #[derive(Debug)]
@@ -17,7 +18,8 @@ pub struct SequenceFolder {
     path: PathBuf,
 }
 
-/// Folders with one file a frame, and the files' extension; the motion's have none for the last frame.
+/// Folders with one file for each frame, and the extension of the files. Depth velocity and flow have none for the last
+/// frame.
 const FRAME_FOLDERS: [(&str, &str); 7] = [
     ("image_0", "png"),
     ("image_1", "png"),
@@ -28,7 +30,7 @@ const FRAME_FOLDERS: [(&str, &str); 7] = [
     ("truth/flow", "flo"),
 ];
 
-/// Files that tell of all frames.
+/// Files about all frames together.
 const SEQUENCE_FILES: [&str; 4] = ["times.txt", "poses.txt", "truth/trajectory_tum.txt", "truth/motion.toml"];
 
 /// `truth/motion.toml`.
@@ -49,11 +51,13 @@ struct TrueMotion {
     phi_cyclopean: [f64; 6],
 }
 
+/// Comment at the head of `truth/motion.toml`.
 const MOTION_HEAD: &str = "\
 # Motion of the scene from the frame before to `frame`: tX, tY, tZ (metres) and ΩX, ΩY, ΩZ (radians) of φ, with
 # P' = R P + T and (R, T) = exp(φ). The camera moves by the inverse. X right, Y down, Z forward.
 ";
 
+/// Comment at the head of `scene.toml`.
 const SCENE_HEAD: &str = "\
 # Where the sequence takes place, and what sees it: egomotion simulate --sequence NAME --scene THIS_FILE.
 # The world's frame is that of the cyclopean camera, in the middle between left and right, at frame 0.
@@ -110,7 +114,7 @@ impl SequenceFolder {
     /// # Errors
     /// A file cannot be written.
     pub fn write_scene(&self, simulation: &Simulation) -> Result<(), IoError> {
-        calibration::write(&self.path.join("calib.txt"), &simulation.sequence.rig)?;
+        kitti::write_grey_pair(&self.path.join("calib.txt"), &simulation.sequence.rig)?;
         let scene = SceneSetup {
             rig: Some(simulation.sequence.rig),
             sensor: Some(simulation.sensor),

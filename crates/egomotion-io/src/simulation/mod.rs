@@ -12,10 +12,16 @@ use serde::{Deserialize, Serialize};
 use crate::{IoError, OptionsError, read};
 pub use folder::SequenceFolder;
 
-/// Rays along each side of a pixel that shows an edge.
+/// Rays along each side of a pixel that shows an edge, 9 for each of them: more make edges smoother and rendering slower.
 const RAYS_ACROSS_PIXEL: usize = 3;
 
-/// What is asked for.
+/// Pixels along each side of the grid that is looked at for surfaces: 64 pixels, enough to tell a quarter of an image.
+const SAMPLES_ACROSS: usize = 8;
+
+/// The most pixels of an image that is rendered, 2²⁵, 8K: a bound on memory and time.
+const MAX_PIXELS: usize = 1 << 25;
+
+/// Which sequence is rendered, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulationOptions {
     /// Name of the motion and its scene, one of [`Sequence::names`].
@@ -64,7 +70,7 @@ pub struct Simulation {
     pub frames: usize,
     /// Factor of every motion of the named sequence.
     pub step: f64,
-    /// What the user should know of it.
+    /// What a user should know about it, each in one line.
     pub warnings: Vec<String>,
 }
 
@@ -80,7 +86,7 @@ struct SceneSetup {
 }
 
 impl Simulation {
-    /// What is asked for.
+    /// The sequence that the options ask for, ready to be rendered.
     ///
     /// # Errors
     /// There is no such sequence, or no such image; the scene's file is wrong; the cameras would leave the room at once.
@@ -194,7 +200,6 @@ fn clear_frames(
 
 /// Whether more than a quarter of an even grid of pixels sees no surface at frame `k`.
 fn looks_away(sequence: &Sequence, k: usize) -> bool {
-    const SAMPLES_ACROSS: usize = 8;
     let Some(view) = sequence.view(k) else { return false };
     let place = |i: usize, size: usize| (i as f64 + 0.5) / SAMPLES_ACROSS as f64 * (size as f64 - 1.0);
     let sees = |i: &usize| {
@@ -204,9 +209,6 @@ fn looks_away(sequence: &Sequence, k: usize) -> bool {
     };
     4 * (0..SAMPLES_ACROSS * SAMPLES_ACROSS).filter(sees).count() < 3 * SAMPLES_ACROSS * SAMPLES_ACROSS
 }
-
-/// Pixels of the largest image that is rendered, 2²⁵: 8K is one.
-const MAX_PIXELS: usize = 1 << 25;
 
 /// Whether images of this size can be rendered and kept.
 ///

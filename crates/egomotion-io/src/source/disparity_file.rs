@@ -11,14 +11,14 @@ use crate::{IoError, image, read};
 #[derive(Debug, Clone, PartialEq)]
 pub struct DisparityFile {
     /// The file.
-    pub file: PathBuf,
+    pub(super) file: PathBuf,
     /// How it holds disparity.
-    pub encoding: DisparityEncoding,
+    pub(super) encoding: DisparityEncoding,
 }
 
 /// How a file holds disparity.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum DisparityEncoding {
+pub(super) enum DisparityEncoding {
     /// KITTI's 16-bit PNG, in 1/256 px, 0 missing.
     Kitti,
     /// Grey levels, 0 missing.

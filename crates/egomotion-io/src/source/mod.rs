@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use crate::IoError;
 use datasets::Recognised;
-pub use disparity_file::{DisparityEncoding, DisparityFile};
+pub use disparity_file::DisparityFile;
 pub use layout::DatasetLayout;
 use layout::KNOWN_LAYOUTS;
 pub use sequence::{Clock, DepthSensor, FrameFiles, Sequence, TruthFiles};

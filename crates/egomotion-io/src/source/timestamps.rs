@@ -8,7 +8,7 @@ use nalgebra::{Rotation3, UnitQuaternion};
 use crate::tables::trajectory::Pose;
 use crate::{IoError, read};
 
-/// Times no further apart are one: a time stamp of today in seconds is rounded to 2.4e-7 s.
+/// Times no further apart than this are equal, in seconds: as a float a time stamp of today is rounded to 2.4e-7 s.
 const TIME_ROUNDING_S: f64 = 1e-6;
 
 /// The pose at a time: linear in position, spherical in rotation; `None` outside the poses or between two that are

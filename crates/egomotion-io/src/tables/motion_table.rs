@@ -40,21 +40,22 @@ pub struct EstimatedMotion {
 
 impl EstimatedMotion {
     /// Whether every component is determined.
-    pub fn is_complete(&self) -> bool {
+    pub(crate) fn is_complete(&self) -> bool {
         self.observed == [true; 6]
     }
 
     /// The column `observed`: of each component 1 or 0.
-    pub fn observed_word(&self) -> String {
+    pub(crate) fn observed_word(&self) -> String {
         self.observed.map(|observed| if observed { '1' } else { '0' }).iter().collect()
     }
 }
 
-/// Columns before and after those of the covariance.
+/// Columns before those of the covariance: frame, time stamp (s), interval (s), and φ in metres and radians.
 const COLUMNS_BEFORE_COVARIANCE: [&str; 9] = ["frame", "time_s", "dt_s", "tx", "ty", "tz", "wx", "wy", "wz"];
+/// Columns after those of the covariance; times to impact are in seconds.
 const COLUMNS_AFTER_COVARIANCE: [&str; 7] =
     ["rows", "inliers", "observed", "impact_s", "impact_lo_s", "impact_hi_s", "status"];
-/// Number of all columns.
+/// Number of all columns; the covariance has 21, its upper triangle.
 const COLUMN_COUNT: usize = COLUMNS_BEFORE_COVARIANCE.len() + 21 + COLUMNS_AFTER_COVARIANCE.len();
 /// What to do about a table that cannot be read.
 const ADVICE_ON_FORMAT: &str = "give a motion.csv as `egomotion run` writes it";

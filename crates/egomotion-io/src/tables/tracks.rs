@@ -22,14 +22,16 @@ pub struct TrackTable {
     pub rig: Option<StereoRig>,
 }
 
-/// The most frames that a table may have.
+/// Largest number of a frame plus 1: a bound on what one wrong digit in a file can ask for.
 const MAX_FRAMES: usize = 10_000_000;
+/// What to do about a CSV file of tracks that cannot be read: its columns.
+const ADVICE_ON_COLUMNS: &str = "give frame,track,u_left,v_left,u_right,v_right and perhaps time_s";
 
 /// Tracks from a file, told by its name: `.npz`, or else CSV.
 ///
 /// # Errors
 /// The file cannot be read, or [`decode_npz`] or [`parse_csv`] refuses it.
-pub fn read(path: &Path) -> Result<TrackTable, IoError> {
+pub(crate) fn read(path: &Path) -> Result<TrackTable, IoError> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz")) {
         decode_npz(&npz::read(path)?, path)
     } else {
@@ -43,8 +45,8 @@ pub fn read(path: &Path) -> Result<TrackTable, IoError> {
 /// # Errors
 /// Names the line: a column is missing, a value is no number, or a track occurs twice in a frame.
 pub fn parse_csv(text: &str, path: &Path) -> Result<TrackTable, IoError> {
-    const ADVICE: &str = "give frame,track,u_left,v_left,u_right,v_right and perhaps time_s";
-    let refuse = |line: u64, reason: String| IoError::new(path, reason, ADVICE).at_line(line as usize);
+    let refuse =
+        |line: u64, reason: String| IoError::new(path, reason, ADVICE_ON_COLUMNS).at_line(line as usize);
     let mut reader =
         csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
     let head = reader.headers().map_err(|error| refuse(1, error.to_string()))?.clone();

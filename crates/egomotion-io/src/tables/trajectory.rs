@@ -30,7 +30,8 @@ pub enum TrajectoryFormat {
     Euroc,
 }
 
-/// How far R Rᵀ may be from the identity in a file: files round to few digits.
+/// Largest entry of R Rᵀ − I that still passes for a rotation: files round R to few digits, and what is no rotation
+/// at all is much further off.
 const ROTATION_TOLERANCE: f64 = 1e-2;
 
 /// A trajectory of either format; see [`parse`].
@@ -117,14 +118,14 @@ fn euroc_pose(line: &str) -> Result<Pose, String> {
 }
 
 /// One row of EuRoC's CSV, without the end of line.
-pub fn euroc_row(time_s: f64, world_from_camera: &RigidMotion) -> String {
+fn euroc_row(time_s: f64, world_from_camera: &RigidMotion) -> String {
     let (t, q) = (&world_from_camera.translation, world_from_camera.quaternion());
     let nanoseconds = (time_s.fract() * 1e9).round() as i128 + time_s.trunc() as i128 * 1_000_000_000;
     format!("{nanoseconds},{:?},{:?},{:?},{:?},{:?},{:?},{:?}", t.x, t.y, t.z, q.w, q.i, q.j, q.k)
 }
 
 /// One TUM row, without the end of line; numbers are written so that they read back the same.
-pub fn tum_row(time_s: f64, world_from_camera: &RigidMotion) -> String {
+fn tum_row(time_s: f64, world_from_camera: &RigidMotion) -> String {
     let (t, q) = (&world_from_camera.translation, world_from_camera.quaternion());
     format!("{time_s} {:?} {:?} {:?} {:?} {:?} {:?} {:?}", t.x, t.y, t.z, q.i, q.j, q.k, q.w)
 }

@@ -7,7 +7,8 @@ use std::path::Path;
 use ::image as image_crate;
 use egomotion::geometry::{Distortion, Field, Gaussian, Grid, RigidMotion};
 use egomotion_io::calibration::{
-    self, Calibration, CameraModel, CameraPair, RawPair, StereoCalibration, euroc, kalibr, opencv, rig, ros,
+    self, CameraModel, CameraPair, KittiCalibration, RawPair, StereoCalibration, euroc, kalibr, opencv, rig,
+    ros,
 };
 use egomotion_io::motion_table::{self, EstimatedMotion, MotionRow};
 use egomotion_io::trajectory::{self, Pose};
@@ -157,7 +158,7 @@ pub fn kinds() -> Vec<(&'static str, Vec<u8>, Reader, bool)> {
             "calib.txt",
             calibration.to_vec(),
             |c, p| {
-                let calibration = Calibration::parse(&String::from_utf8_lossy(c), p)?;
+                let calibration = KittiCalibration::parse(&String::from_utf8_lossy(c), p)?;
                 calibration.left_centre(CameraPair::Grey)?;
                 calibration.rig(CameraPair::Grey, (1242, 375)).map(|rig| assert!(rig.check().is_ok()))
             },

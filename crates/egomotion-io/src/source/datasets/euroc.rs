@@ -15,10 +15,12 @@ use crate::source::timestamps::interpolated_pose;
 use crate::tables::trajectory::{self, TrajectoryFormat};
 use crate::{IoError, read};
 
-/// Left and right images further apart in time than this do not belong together, in nanoseconds.
+/// Longest time between a left image and its right one, in nanoseconds: the cameras are triggered together, and frames
+/// are 50 ms apart.
 const MAX_PAIR_DELAY_NS: i64 = 2_000_000;
 
-/// True poses further apart than this leave what lies between unknown, in seconds.
+/// Longest time between two true poses over which they are interpolated, in seconds; longer gaps leave a frame without
+/// truth.
 const MAX_POSE_GAP_S: f64 = 0.1;
 
 /// Image files by time stamp in nanoseconds.

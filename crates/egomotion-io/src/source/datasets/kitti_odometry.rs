@@ -6,7 +6,7 @@ use egomotion::geometry::RigidMotion;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{KITTI_INTERVAL_S, Recognised};
-use crate::calibration::{self, Calibration, CameraPair, StereoCalibration};
+use crate::calibration::{self, CameraPair, KittiCalibration, StereoCalibration};
 use crate::source::layout::DatasetLayout;
 use crate::source::listing;
 use crate::source::sequence::{Clock, FrameFiles, Sequence};
@@ -30,7 +30,7 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
     let file = calibration.unwrap_or(&own);
     let calibration = match calibration {
         Some(file) => calibration::read(file)?,
-        None => StereoCalibration::Kitti(Calibration::read(file)?),
+        None => StereoCalibration::Kitti(KittiCalibration::read(file)?),
     };
     let rectified = calibration.pair(pair, listing::image_size(&frames)?, file)?;
     let clock = stamp(&mut frames, &folder.join("times.txt"))?;

@@ -6,15 +6,15 @@ use egomotion::geometry::RigidMotion;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 use super::Recognised;
-use crate::calibration::{Calibration, CameraPair};
+use crate::calibration::{CameraPair, KittiCalibration};
 use crate::source::layout::DatasetLayout;
 use crate::source::listing;
 use crate::source::sequence::{Clock, FrameFiles, Sequence};
 use crate::{IoError, read};
 
-/// Radius of the sphere on which the set's positions are laid out, in metres.
+/// Radius in metres of the sphere of the Mercator projection, as in the development kit of the set: the equator's of WGS 84.
 const EARTH_RADIUS_M: f64 = 6_378_137.0;
-/// Seconds of a day.
+/// Length of a day in seconds.
 const DAY_S: f64 = 86_400.0;
 
 /// The folder as a raw drive; `None` if it has no `image_00/data` … `image_03/data`.
@@ -30,7 +30,7 @@ pub(super) fn recognise(folder: &Path, calibration: Option<&Path>) -> Result<Opt
     )?;
     let mut frames = listing::pairs(&left_folder, &left, &right);
     let file = calibration.map_or_else(|| beside(folder, "calib_cam_to_cam.txt"), Path::to_owned);
-    let cameras = Calibration::read(&file)?;
+    let cameras = KittiCalibration::read(&file)?;
     let rig = cameras.rig(pair, listing::image_size(&frames)?)?;
     stamp(&mut frames, &left_folder.with_file_name("timestamps.txt"))?;
     if folder.join("oxts").join("data").is_dir() {

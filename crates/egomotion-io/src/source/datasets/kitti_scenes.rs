@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use super::{KITTI_INTERVAL_S, Recognised};
 use crate::IoError;
-use crate::calibration::{self, Calibration, CameraPair, StereoCalibration};
+use crate::calibration::{self, CameraPair, KittiCalibration, StereoCalibration};
 use crate::source::disparity_file::{DisparityEncoding, DisparityFile};
 use crate::source::layout::DatasetLayout;
 use crate::source::listing;
 use crate::source::sequence::{Clock, Sequence, TruthFiles};
 
-/// The frame of a scene that the true maps belong to.
+/// Number of the frame of a scene that the true maps belong to: `000002_10.png` has them, in both sets.
 const TRUTH_FRAME: usize = 10;
 
 /// Where a set keeps its files.
@@ -109,7 +109,7 @@ impl SceneSet {
         let file = calibration.unwrap_or(&own);
         let calibration = match calibration {
             Some(file) => calibration::read(file)?,
-            None => StereoCalibration::Kitti(Calibration::read(file)?),
+            None => StereoCalibration::Kitti(KittiCalibration::read(file)?),
         };
         let pair = calibration.pair(self.pair, listing::image_size(&frames)?, file)?;
         let truth_files = self.truth(folder, &name);

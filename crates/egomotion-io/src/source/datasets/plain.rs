@@ -24,7 +24,7 @@ use crate::source::sequence::{Clock, DepthSensor, FrameFiles, Sequence};
 use crate::tables::trajectory;
 use crate::{IoError, image, read};
 
-/// Names of the folders of left and right images.
+/// Names of the folders of left and right images, in the order in which they are looked for.
 const STEREO_FOLDERS: [(&str, &str); 6] = [
     ("left", "right"),
     ("Left", "Right"),
@@ -33,11 +33,11 @@ const STEREO_FOLDERS: [(&str, &str); 6] = [
     ("cam0", "cam1"),
     ("camera_left", "camera_right"),
 ];
-/// Names of the folders of images beside `depth`.
+/// Names of the folder of images beside `depth`, in the order in which they are looked for.
 const IMAGE_FOLDERS_BESIDE_DEPTH: [&str; 6] = ["rgb", "color", "colour", "image", "images", "left"];
-/// Rate that is assumed, in frames a second.
+/// Frames a second where neither `times.txt` nor `rate_hz` tells: velocities and times to impact scale with it.
 const DEFAULT_RATE_HZ: f64 = 10.0;
-/// Levels of 16-bit depth images per metre that are assumed: millimetres.
+/// Levels of 16-bit depth images per metre where `rig.toml` has none: millimetres, which most depth cameras write.
 const DEFAULT_LEVELS_PER_M: f64 = 1000.0;
 
 /// What `rig.toml` says beside a stereo calibration.

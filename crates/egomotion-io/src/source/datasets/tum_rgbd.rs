@@ -13,13 +13,16 @@ use crate::source::timestamps::{associate, interpolated_pose, read_stamped_files
 use crate::tables::trajectory::{self, TrajectoryFormat};
 use crate::{IoError, read};
 
-/// Longest time between an image and the depth that belongs to it, in seconds: that of the set's own tool.
+/// Longest time between an image and its depth image, in seconds: the default of the set's own `associate.py`.
 const MAX_DEPTH_DELAY_S: f64 = 0.02;
-/// True poses further apart than this leave what lies between unknown, in seconds.
+/// Longest time between two true poses over which they are interpolated, in seconds. The set has some hundred poses a
+/// second; longer gaps leave a frame without truth.
 const MAX_POSE_GAP_S: f64 = 0.2;
-/// Levels of the depth images per metre.
+/// Levels of the depth images per metre, as the set publishes it.
 const LEVELS_PER_M: f64 = 5000.0;
 
+/// The numbers of a calibration file, for the advice of its errors.
+const EXPECTED_NUMBERS: &str = "fx fy cx cy in pixels and perhaps k1 k2 p1 p2 k3";
 /// fx, fy, cx, cy and k1, k2, p1, p2, k3 of the colour cameras of freiburg1, 2 and 3, as the set publishes them.
 ///
 /// Depth was registered to the colour images as they are, distorted: both are warped alike.
@@ -99,9 +102,6 @@ fn camera(
     let lens = Camera::new((fx, fy), (cx, cy), lens, size).map_err(|error| refuse(error.to_string()))?;
     Ok((rig, Some(lens)))
 }
-
-/// What a calibration file holds.
-const EXPECTED_NUMBERS: &str = "fx fy cx cy in pixels and perhaps k1 k2 p1 p2 k3";
 
 /// The numbers of a file's first line, distortion 0 where it has none.
 fn numbers(file: &Path) -> Result<[f64; 9], IoError> {
