@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// Two arrays (H, W).
-pub type Two<'py, T> = (Bound<'py, PyArray2<T>>, Bound<'py, PyArray2<T>>);
+pub type ArrayPair<'py, T> = (Bound<'py, PyArray2<T>>, Bound<'py, PyArray2<T>>);
 
 /// What NumPy makes of an argument, without a copy where that is possible; what gives only DLPack goes in too.
 fn array<'py>(argument: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {

@@ -21,7 +21,7 @@ use crate::rig::Rig;
 #[pyfunction]
 #[pyo3(signature = (path, *, calibration = None))]
 pub fn sequences(py: Python<'_>, path: PathBuf, calibration: Option<PathBuf>) -> PyResult<Vec<String>> {
-    let source = py.detach(|| Source::open_with(&path, calibration.as_deref())).map_err(error::read)?;
+    let source = py.detach(|| Source::open_with(&path, calibration.as_deref())).map_err(error::file)?;
     Ok(source.sequences.into_iter().map(|sequence| sequence.name).collect())
 }
 
@@ -83,9 +83,9 @@ pub fn run(
     };
     let (config, threads) = (config(py, Some(&settings))?, Threads::new(threads)?);
     let (name, recording) = py.detach(|| -> PyResult<_> {
-        let source = Source::open_with(&path, calibration.as_deref()).map_err(error::read)?;
+        let source = Source::open_with(&path, calibration.as_deref()).map_err(error::file)?;
         let found = named(source, sequence)?;
-        Ok((found.name.clone(), Recording::open(&path, &found, &choice).map_err(error::choice)?))
+        Ok((found.name.clone(), Recording::open(&path, &found, &choice).map_err(error::options)?))
     })?;
     let pipeline = recording.pipeline(&config).map_err(error::value)?;
     let recording = Arc::new(recording);
@@ -199,7 +199,7 @@ impl Run {
 
     /// Their times (n,) in seconds.
     #[getter]
-    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, numpy::PyArray1<f64>> {
+    fn times_s<'py>(&self, py: Python<'py>) -> Bound<'py, numpy::PyArray1<f64>> {
         numpy::PyArray1::from_slice(py, self.trajectory.times_s())
     }
 

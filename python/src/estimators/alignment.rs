@@ -7,9 +7,9 @@ use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::{Estimate, Robustness};
 use crate::arrays;
 use crate::error::unsolvable;
-use crate::estimate::Estimate;
 use crate::geometry::Motion;
 
 /// A matrix (3, 3) and a translation (3,) that take points `before` (n, 3) to `after` (n, 3), all alike: "rigid" by SVD,
@@ -39,14 +39,9 @@ pub fn align_phi(
     estimator: &str,
 ) -> PyResult<Estimate> {
     let (pairs, form) = (pairs(before, after)?, self::form(form)?);
-    let fitting = match estimator {
-        "ls" => Fitting::LeastSquares,
-        "lmeds" => Fitting::Lmeds(LmedsOptions::default()),
-        other => {
-            return Err(PyValueError::new_err(format!(
-                "estimator {other:?} is not known; give 'ls' or 'lmeds'"
-            )));
-        }
+    let fitting = match Robustness::named(estimator)? {
+        Robustness::LeastSquares => Fitting::LeastSquares,
+        Robustness::Lmeds => Fitting::Lmeds(LmedsOptions::default()),
     };
     let found = py.detach(|| alignment::align(&pairs, form, &fitting));
     Ok(Estimate::of(&found.map_err(unsolvable)?))

@@ -1,19 +1,17 @@
-//! Estimators on what was measured: maximum likelihood with its bound, and errors in variables.
+//! Maximum likelihood on tracks of a stereo pair, and its Cramér–Rao bound.
 
 use egomotion::estimate::likelihood::maximum_likelihood as likelihood;
-use egomotion::estimate::linear::errors_in_variables as variables;
 use egomotion::estimate::linear::m_estimator::StudentT;
 use egomotion::estimate::{Blocks, Unsolvable};
 use egomotion::geometry::Twist;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
+use super::{Estimate, student_t};
 use crate::arrays;
 use crate::error::unsolvable;
-use crate::estimate::Estimate;
-use crate::estimators::kernel;
 use crate::geometry::twist;
-use crate::observations::{DepthChanges, StereoTracks};
+use crate::observations::StereoTracks;
 use crate::rig::Rig;
 
 /// φ of maximum likelihood in (x, y, d) at both times, with the cost Σ eᵀ S⁻¹ e as second value.
@@ -33,7 +31,7 @@ pub fn maximum_likelihood(
     iterations: Option<usize>,
     tolerance: Option<f64>,
 ) -> PyResult<(Estimate, f64)> {
-    let default = kernel(nu)?;
+    let default = student_t(nu)?;
     let kernel = StudentT {
         iterations: iterations.unwrap_or(default.iterations),
         tolerance: tolerance.unwrap_or(default.tolerance),
@@ -58,20 +56,4 @@ pub fn cramer_rao_bound<'py>(
     let phi = twist("phi", phi)?;
     let bound = likelihood::cramer_rao_bound(&tracks.0, &rig.0, &phi);
     arrays::square(py, &bound.ok_or_else(|| unsolvable(Unsolvable::Unobservable))?)
-}
-
-/// φ from depth changes with noisy gradients: DCCE without its bias, from `start` (6,).
-#[pyfunction]
-#[pyo3(signature = (changes, rig, *, start = None, block_px = 48.0))]
-pub fn errors_in_variables(
-    py: Python<'_>,
-    changes: &DepthChanges,
-    rig: &Rig,
-    start: Option<&Bound<'_, PyAny>>,
-    block_px: f64,
-) -> PyResult<Estimate> {
-    let start = start.map_or_else(|| Ok(Twist::zero()), |start| twist("start", start))?;
-    let blocks = Blocks::over(&rig.0, block_px);
-    let found = py.detach(|| variables::errors_in_variables(&changes.0, &rig.0, &start, &blocks));
-    Ok(Estimate::of(&found.map_err(unsolvable)?))
 }

@@ -16,8 +16,8 @@ use crate::geometry::twist;
 use crate::observations::StereoTracks;
 use crate::rig::Rig;
 
-/// A disparity map that the caller has.
-pub fn given_map(
+/// A disparity map that the caller has computed.
+pub fn precomputed_disparity(
     shift: Option<&Bound<'_, PyAny>>,
     sigma: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Option<DisparityMap>> {
@@ -28,7 +28,9 @@ pub fn given_map(
         };
     };
     let shift = arrays::field("disparity", shift)?;
-    let Some(sigma) = sigma else { return Ok(Some(DisparityMap::given(shift, |_| precomputed::DEFAULT_SIGMA_PX))) };
+    let Some(sigma) = sigma else {
+        return Ok(Some(DisparityMap::given(shift, |_| precomputed::DEFAULT_SIGMA_PX)));
+    };
     let sigma = arrays::field("disparity_sigma", sigma)?;
     if sigma.size() != shift.size() {
         return Err(error::value("disparity and disparity_sigma differ in size"));
@@ -36,23 +38,23 @@ pub fn given_map(
     Ok(Some(DisparityMap { shift, sigma }))
 }
 
-/// Flow that the caller has.
-pub fn given_flow(
+/// Flow that the caller has computed.
+pub fn precomputed_flow(
     flow: Option<&Bound<'_, PyAny>>,
     covariance: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Option<FlowField>> {
     let Some(flow) = flow else {
         return match covariance {
             None => Ok(None),
-            Some(_) => Err(error::value("flow_covariance needs flow")),
+            Some(_) => Err(error::value("flow_cov needs flow")),
         };
     };
     let [u, v] = arrays::fields("flow", flow)?;
     let found = FlowField::given(u, v, precomputed::DEFAULT_SIGMA_PX);
     let Some(covariance) = covariance else { return Ok(Some(found)) };
-    let planes = arrays::fields::<3>("flow_covariance", covariance)?;
+    let planes = arrays::fields::<3>("flow_cov", covariance)?;
     if planes[0].size() != found.size() {
-        return Err(error::value("flow and flow_covariance differ in size"));
+        return Err(error::value("flow and flow_cov differ in size"));
     }
     let [cov_uu, cov_uv, cov_vv] = planes.map(|plane| plane.grid().clone());
     Ok(Some(FlowField { cov_uu, cov_uv, cov_vv, ..found }))
@@ -76,7 +78,7 @@ pub fn disparity<'py>(
     left: &Bound<'py, PyAny>,
     right: &Bound<'py, PyAny>,
     settings: Option<&Bound<'py, PyDict>>,
-) -> PyResult<arrays::Two<'py, f32>> {
+) -> PyResult<arrays::ArrayPair<'py, f32>> {
     let (left, right) = (arrays::image("left", left)?, arrays::image("right", right)?);
     let options = part(py, "disparity", settings)?.disparity;
     let map = py.detach(|| DisparityMatcher::new(options).compute(&left, &right)).map_err(error::value)?;
@@ -109,20 +111,20 @@ pub fn flow<'py>(
 
 /// Corners found in a stereo pair and followed to the next: (x, y, d) before and after with their covariances.
 ///
-/// `expected` is a motion φ (6,) of the scene near which they are looked for; keywords are the settings `tracks` of
+/// `expected_phi` is a motion φ (6,) of the scene near which they are looked for; keywords are the settings `tracks` of
 /// `default_config()`.
 #[pyfunction]
-#[pyo3(signature = (before, after, rig, *, expected = None, **settings))]
+#[pyo3(signature = (before, after, rig, *, expected_phi = None, **settings))]
 pub fn track(
     py: Python<'_>,
     before: (Bound<'_, PyAny>, Bound<'_, PyAny>),
     after: (Bound<'_, PyAny>, Bound<'_, PyAny>),
     rig: &Rig,
-    expected: Option<&Bound<'_, PyAny>>,
+    expected_phi: Option<&Bound<'_, PyAny>>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<StereoTracks> {
     let options = part(py, "tracks", settings)?.tracks;
-    let expected: Option<Twist> = expected.map(|phi| twist("expected", phi)).transpose()?;
+    let expected_phi: Option<Twist> = expected_phi.map(|phi| twist("expected_phi", phi)).transpose()?;
     let size = (rig.0.width_px, rig.0.height_px);
     let pair = |(left, right): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let images = (arrays::image("left", &left)?, arrays::image("right", &right)?);
@@ -142,7 +144,7 @@ pub fn track(
             images.renew(&left, Some(&right), options.pyramid_levels);
             images
         };
-        let hints = Hints { motion: expected.as_ref(), ..Hints::default() };
+        let hints = Hints { motion: expected_phi.as_ref(), ..Hints::default() };
         stereo_tracks(&pyramid(before), &pyramid(after), &rig.0, hints, &options)
     })))
 }

@@ -1,4 +1,4 @@
-//! The synthetic world: rendered sequences with exact truth.
+//! A rendered sequence in memory: poses, exact motions, images, true maps.
 
 use egomotion::geometry::RigidMotion;
 use egomotion::sim;
@@ -18,21 +18,22 @@ pub struct Sequence(sim::Sequence);
 
 #[pymethods]
 impl Sequence {
-    /// The sequence of that name, of `names()`; `size` (width, height), `frames`, and a factor `step` of every motion.
+    /// The sequence of that name, of `names()`; `size_px` (width, height), `frames`, and a factor `step` of every motion.
     #[new]
-    #[pyo3(signature = (name, *, size = None, frames = None, step = 1.0))]
-    fn new(name: &str, size: Option<(usize, usize)>, frames: Option<usize>, step: f64) -> PyResult<Self> {
+    #[pyo3(signature = (name, *, size_px = None, frames = None, step = 1.0))]
+    fn new(name: &str, size_px: Option<(usize, usize)>, frames: Option<usize>, step: f64) -> PyResult<Self> {
         if !step.is_finite() {
             return Err(PyValueError::new_err("step is not a number"));
         }
-        if size.is_some_and(|(width, height)| !(16..=8192).contains(&width) || !(16..=8192).contains(&height))
+        if size_px
+            .is_some_and(|(width, height)| !(16..=8192).contains(&width) || !(16..=8192).contains(&height))
         {
-            return Err(PyValueError::new_err("size must be 16 to 8192 pixels in both directions"));
+            return Err(PyValueError::new_err("size_px must be 16 to 8192 pixels in both directions"));
         }
         if frames.is_some_and(|frames| !(1..=1_000_000).contains(&frames)) {
             return Err(PyValueError::new_err("frames must be 1 to 1000000"));
         }
-        let found = sim::Sequence::named(name, size, frames, step);
+        let found = sim::Sequence::named(name, size_px, frames, step);
         let known = || sim::Sequence::names().collect::<Vec<_>>().join(", ");
         found
             .map(Self)
@@ -53,7 +54,7 @@ impl Sequence {
 
     /// Seconds from frame to frame; 1 where the motion is defined per frame only.
     #[getter]
-    fn interval(&self) -> f64 {
+    fn interval_s(&self) -> f64 {
         self.0.interval_s
     }
 
@@ -69,7 +70,7 @@ impl Sequence {
     }
 
     /// Distance in metres from the nearer camera to the nearest surface at frame k; negative outside the room.
-    fn clearance(&self, k: usize) -> PyResult<f64> {
+    fn clearance_m(&self, k: usize) -> PyResult<f64> {
         self.0.clearance_m(k).ok_or_else(past_the_end)
     }
 
@@ -84,7 +85,7 @@ impl Sequence {
         noise: bool,
         seed: u64,
         samples: usize,
-    ) -> PyResult<arrays::Two<'py, f32>> {
+    ) -> PyResult<arrays::ArrayPair<'py, f32>> {
         if !(1..=16).contains(&samples) {
             return Err(PyValueError::new_err("samples must be 1 to 16"));
         }

@@ -1,5 +1,7 @@
 //! The paper's studies and ours: parts that can be run anywhere, and what their records show.
 
+mod draws;
+
 use std::sync::Arc;
 
 use egomotion_study::assumptions::Assumptions;
@@ -17,6 +19,11 @@ use serde::de::DeserializeOwned;
 use crate::config::from_keywords;
 use crate::error;
 use crate::signals::interruptible;
+pub use draws::{StudyDraw, StudyDraws, study_draws};
+
+/// Names of the studies, in the order in which `names()` gives them.
+const NAMES: [&str; 7] =
+    ["table", "sensitivity", "uncertainty", "real", "assumptions", "consistency", "efficiency"];
 
 /// A study of any kind; records are JSON texts.
 trait AnyStudy: Send + Sync {
@@ -75,9 +82,6 @@ pub struct Study {
     study: Arc<dyn AnyStudy>,
     name: String,
 }
-
-const NAMES: [&str; 7] =
-    ["table", "sensitivity", "uncertainty", "real", "assumptions", "consistency", "efficiency"];
 
 #[pymethods]
 impl Study {

@@ -1,19 +1,24 @@
-//! Estimators on rows of equations.
+//! Estimators on rows of linear equations, and on depth changes whose coefficients are noisy.
 
+use egomotion::estimate::linear::errors_in_variables as variables;
 use egomotion::estimate::linear::least_squares::{self as squares, Weighting};
 use egomotion::estimate::linear::lmeds::{self as median, LmedsOptions};
-use egomotion::estimate::linear::m_estimator::{StudentT, m_estimate};
+use egomotion::estimate::linear::m_estimator::m_estimate;
 use egomotion::estimate::linear::two_step as steps;
-use egomotion::estimate::{Fit, Row, Unsolvable};
+use egomotion::estimate::{Blocks, Fit, Row, Unsolvable};
+use egomotion::geometry::Twist;
 use nalgebra::SVector;
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+use super::{Estimate, Robustness, student_t};
 use crate::arrays;
 use crate::error::unsolvable;
-use crate::estimate::Estimate;
-use crate::rows::{MOST, Rows, with_unknowns};
+use crate::geometry::twist;
+use crate::observations::DepthChanges;
+use crate::rig::Rig;
+use crate::rows::{MAX_UNKNOWNS, Rows, with_unknowns};
 
 fn weighting(weighted: bool) -> Weighting {
     if weighted { Weighting::InverseVariance } else { Weighting::Unit }
@@ -44,7 +49,7 @@ pub fn irls(py: Python<'_>, rows: &Rows, start: Option<Vec<f64>>, nu: Option<f64
     if let Some(start) = &start {
         arrays::same_length("start", start.len(), rows.unknowns)?;
     }
-    let kernel = kernel(nu)?;
+    let kernel = student_t(nu)?;
     py.detach(|| {
         with_unknowns!(rows, N => {
             let rows = rows.to::<N>();
@@ -55,16 +60,6 @@ pub fn irls(py: Python<'_>, rows: &Rows, start: Option<Vec<f64>>, nu: Option<f64
             fitted(m_estimate(&rows, &start, &kernel), &rows)
         })
     })
-}
-
-/// Student's t; by default that of the pipeline.
-pub fn kernel(nu: Option<f64>) -> PyResult<StudentT> {
-    let default = StudentT::default();
-    match nu {
-        None => Ok(default),
-        Some(nu) if nu > 0.0 => Ok(StudentT { nu, fitted: false, ..default }),
-        Some(nu) => Err(PyValueError::new_err(format!("nu is {nu}; give a positive number"))),
-    }
 }
 
 fn lmeds_options(
@@ -139,46 +134,51 @@ pub fn lmeds_search<'py>(
     Ok((PyArray1::from_vec(py, theta), median_square))
 }
 
-/// Number of random subsets (59) for confidence P, share of outliers ε and p rows each.
+/// Number of random subsets (59) for confidence P, share of outliers ε and as many rows in each as there are unknowns.
 #[pyfunction]
-pub fn lmeds_trials(confidence: f64, outliers: f64, p: u32) -> PyResult<usize> {
+pub fn lmeds_trials(confidence: f64, outliers: f64, unknowns: u32) -> PyResult<usize> {
     let possible = (0.0..1.0).contains(&confidence) && (0.0..1.0).contains(&outliers);
     if possible {
-        Ok(median::trials(confidence, outliers, p))
+        Ok(median::trials(confidence, outliers, unknowns))
     } else {
         Err(PyValueError::new_err("confidence and outliers must lie in 0 … 1, without 1"))
     }
 }
 
-/// The robust standard deviation from the median square of n residuals with p unknowns.
+/// The robust standard deviation of residuals from the median of their squares, their number and that of the unknowns.
 #[pyfunction]
-pub fn robust_scale(median_square: f64, n: usize, p: usize) -> f64 {
-    median::robust_scale(median_square, n, p)
+pub fn robust_scale(median_square: f64, residuals: usize, unknowns: usize) -> f64 {
+    median::robust_scale(median_square, residuals, unknowns)
 }
 
 /// φ by binocular flow in the paper's two steps, (14) then (3): `estimator` "ls", or "lmeds" with defaults.
 #[pyfunction]
 #[pyo3(signature = (dv, flow, *, estimator = "ls"))]
 pub fn two_step(py: Python<'_>, dv: &Rows, flow: &Rows, estimator: &str) -> PyResult<Estimate> {
-    if dv.unknowns != MOST || flow.unknowns != MOST {
+    if dv.unknowns != MAX_UNKNOWNS || flow.unknowns != MAX_UNKNOWNS {
         return Err(PyValueError::new_err("two_step needs equations in the six components of φ"));
     }
-    let robust = match estimator {
-        "ls" => false,
-        "lmeds" => true,
-        other => {
-            return Err(PyValueError::new_err(format!(
-                "estimator {other:?} is not known; give 'ls' or 'lmeds'"
-            )));
-        }
-    };
-    let solve = |rows: &[Row<3>]| {
-        if robust {
-            median::lmeds(rows, Weighting::Unit, &LmedsOptions::default())
-        } else {
-            squares::least_squares(rows, Weighting::Unit)
-        }
+    let robustness = Robustness::named(estimator)?;
+    let solve = |rows: &[Row<3>]| match robustness {
+        Robustness::Lmeds => median::lmeds(rows, Weighting::Unit, &LmedsOptions::default()),
+        Robustness::LeastSquares => squares::least_squares(rows, Weighting::Unit),
     };
     let found = py.detach(|| steps::two_step(&dv.to(), &flow.to(), solve));
+    Ok(Estimate::of(&found.map_err(unsolvable)?))
+}
+
+/// φ from depth changes with noisy gradients: DCCE without its bias, from `start` (6,).
+#[pyfunction]
+#[pyo3(signature = (changes, rig, *, start = None, block_px = 48.0))]
+pub fn errors_in_variables(
+    py: Python<'_>,
+    changes: &DepthChanges,
+    rig: &Rig,
+    start: Option<&Bound<'_, PyAny>>,
+    block_px: f64,
+) -> PyResult<Estimate> {
+    let start = start.map_or_else(|| Ok(Twist::zero()), |start| twist("start", start))?;
+    let blocks = Blocks::over(&rig.0, block_px);
+    let found = py.detach(|| variables::errors_in_variables(&changes.0, &rig.0, &start, &blocks));
     Ok(Estimate::of(&found.map_err(unsolvable)?))
 }

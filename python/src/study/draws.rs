@@ -15,37 +15,37 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use super::checked;
 use crate::error;
 use crate::geometry::phi;
 use crate::observations::{DepthFlows, DepthTracks, StereoFlows, StereoTracks};
 use crate::rig::Rig;
-use crate::study::checked;
 
 /// Points of the synthetic world and what was measured at each, with the truth.
 #[pyclass(module = "egomotion", frozen)]
-pub struct Draw {
+pub struct StudyDraw {
     rig: StereoRig,
     phi: Twist,
     depth_velocity: Vec<f64>,
     /// What the depth change constraint takes: `DepthFlows` or `DepthTracks`.
     #[pyo3(get)]
-    changes: Py<PyAny>,
+    dcce: Py<PyAny>,
     /// What binocular flow takes: `StereoFlows` or `StereoTracks`.
     #[pyo3(get)]
-    motions: Py<PyAny>,
-    /// The same with both cameras' v_y, which is what maximum likelihood takes.
+    binocular_flow: Py<PyAny>,
+    /// What maximum likelihood takes: the observations of binocular flow with both cameras' v_y.
     #[pyo3(get)]
-    complete: Py<PyAny>,
+    maximum_likelihood: Py<PyAny>,
     /// The `StereoTracks` without noise, where the Cramér–Rao bound is taken; None of an instant.
     #[pyo3(get)]
-    exact: Option<Py<PyAny>>,
+    exact_tracks: Option<Py<PyAny>>,
     /// Seed of the draw, for a method that needs chance of its own.
     #[pyo3(get)]
     seed: u64,
 }
 
 #[pymethods]
-impl Draw {
+impl StudyDraw {
     /// What sees it.
     #[getter]
     fn rig(&self) -> Rig {
@@ -65,9 +65,9 @@ impl Draw {
     }
 
     /// Where the left camera sees the middle of the rig (3,) in metres: the study's figures are of
-    /// `seen_from(phi, centre)`.
+    /// `seen_from(phi, cyclopean_centre)`.
     #[getter]
-    fn centre<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn cyclopean_centre<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let centre: Vector3<f64> = -self.rig.left_from_cyclopean();
         PyArray1::from_slice(py, centre.as_slice())
     }
@@ -79,7 +79,7 @@ impl Draw {
 
 /// The draws of `Study("table", …)`, one after another.
 #[pyclass(module = "egomotion", frozen)]
-pub struct Draws {
+pub struct StudyDraws {
     study: OneSetting,
     sequence: sim::Sequence,
     approach: Approach,
@@ -88,12 +88,16 @@ pub struct Draws {
     next: AtomicUsize,
 }
 
-/// The draws of `Study("table", **settings)` in one approach, "differential" or "discrete": an iterator of `Draw`.
+/// The draws of `Study("table", **settings)` in one approach, "differential" or "discrete": an iterator of `StudyDraw`.
 ///
 /// They are the same to the last bit, so that a method of one's own stands beside the study's.
 #[pyfunction]
 #[pyo3(signature = (approach, **settings))]
-pub fn draws(py: Python<'_>, approach: &str, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Draws> {
+pub fn study_draws(
+    py: Python<'_>,
+    approach: &str,
+    settings: Option<&Bound<'_, PyDict>>,
+) -> PyResult<StudyDraws> {
     let approach = match approach {
         "differential" => Approach::Differential,
         "discrete" => Approach::Discrete,
@@ -105,10 +109,10 @@ pub fn draws(py: Python<'_>, approach: &str, settings: Option<&Bound<'_, PyDict>
     };
     let study: OneSetting = checked(py, settings)?;
     let sequence = study.sequence().map_err(error::value)?;
-    Ok(Draws { study, sequence, approach, worlds: Mutex::default(), next: AtomicUsize::new(0) })
+    Ok(StudyDraws { study, sequence, approach, worlds: Mutex::default(), next: AtomicUsize::new(0) })
 }
 
-impl Draws {
+impl StudyDraws {
     fn world(&self, i: usize) -> Option<Arc<World>> {
         // A thread that panicked leaves worlds as they are: whole or none.
         let mut worlds = self.worlds.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -119,43 +123,43 @@ impl Draws {
         place.clone()
     }
 
-    fn differential(&self, py: Python<'_>, world: &World, seed: u64) -> PyResult<Draw> {
+    fn differential(&self, py: Python<'_>, world: &World, seed: u64) -> PyResult<StudyDraw> {
         let found = py.detach(|| draw::differential(world, &self.study.measuring, seed));
-        Ok(Draw {
+        Ok(StudyDraw {
             rig: world.rig,
             phi: world.phi,
             depth_velocity: found.pixels.iter().map(|p| p.vz_m).collect(),
-            changes: Py::new(py, DepthFlows(found.changes))?.into_any(),
-            motions: Py::new(py, StereoFlows(found.motions))?.into_any(),
-            complete: Py::new(py, StereoFlows(found.complete))?.into_any(),
-            exact: None,
+            dcce: Py::new(py, DepthFlows(found.changes))?.into_any(),
+            binocular_flow: Py::new(py, StereoFlows(found.motions))?.into_any(),
+            maximum_likelihood: Py::new(py, StereoFlows(found.complete))?.into_any(),
+            exact_tracks: None,
             seed,
         })
     }
 
-    fn discrete(&self, py: Python<'_>, world: &World, seed: u64) -> PyResult<Draw> {
+    fn discrete(&self, py: Python<'_>, world: &World, seed: u64) -> PyResult<StudyDraw> {
         let found = py.detach(|| draw::discrete(world, &self.study.measuring, seed));
         let exact = found.exact(&self.study.measuring);
-        Ok(Draw {
+        Ok(StudyDraw {
             rig: world.rig,
             phi: world.phi,
             depth_velocity: found.pixels.iter().map(|p| p.depth_change_m).collect(),
-            changes: Py::new(py, DepthTracks(found.changes))?.into_any(),
-            motions: Py::new(py, StereoTracks(found.motions))?.into_any(),
-            complete: Py::new(py, StereoTracks(found.complete))?.into_any(),
-            exact: Some(Py::new(py, StereoTracks(exact))?.into_any()),
+            dcce: Py::new(py, DepthTracks(found.changes))?.into_any(),
+            binocular_flow: Py::new(py, StereoTracks(found.motions))?.into_any(),
+            maximum_likelihood: Py::new(py, StereoTracks(found.complete))?.into_any(),
+            exact_tracks: Some(Py::new(py, StereoTracks(exact))?.into_any()),
             seed,
         })
     }
 }
 
 #[pymethods]
-impl Draws {
+impl StudyDraws {
     fn __iter__(this: PyRef<'_, Self>) -> PyRef<'_, Self> {
         this
     }
 
-    fn __next__(&self, py: Python<'_>) -> PyResult<Option<Draw>> {
+    fn __next__(&self, py: Python<'_>) -> PyResult<Option<StudyDraw>> {
         py.check_signals()?;
         let i = self.next.fetch_add(1, Ordering::Relaxed);
         if i >= self.study.draws {
