@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use egomotion_io::stream::{ImageStream, Kind};
+use egomotion_io::stream::{ImageStream, StreamFormat};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|content: &[u8]| {
-    let mut images = ImageStream::new(content, Kind::Png, Path::new("standard input"));
+    let mut images = ImageStream::new(content, StreamFormat::Png, Path::new("standard input"));
     while let Ok(Some(_)) = images.next_image() {}
 });

@@ -1,7 +1,7 @@
 //! NumPy arrays in, planes and points out, and back.
 
 use egomotion::geometry::{Field, Grid, Image};
-use egomotion_io::image::{LUMA, WIDE};
+use egomotion_io::image::{LEVELS_16_PER_8_BIT, luma};
 use nalgebra::{SMatrix, SVector};
 use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// Two arrays (H, W).
-pub type Two<'py, T> = (Bound<'py, PyArray2<T>>, Bound<'py, PyArray2<T>>);
+pub type ArrayPair<'py, T> = (Bound<'py, PyArray2<T>>, Bound<'py, PyArray2<T>>);
 
 /// What NumPy makes of an argument, without a copy where that is possible; what gives only DLPack goes in too.
 fn array<'py>(argument: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
@@ -50,7 +50,9 @@ pub fn image(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<Image> {
     if let Some(image) = values(&array, |shape, levels: &[u8]| grey(name, shape, levels, 1.0))? {
         return Ok(image);
     }
-    if let Some(image) = values(&array, |shape, levels: &[u16]| grey(name, shape, levels, WIDE))? {
+    if let Some(image) =
+        values(&array, |shape, levels: &[u16]| grey(name, shape, levels, LEVELS_16_PER_8_BIT))?
+    {
         return Ok(image);
     }
     let image = values(&array, |shape, levels: &[f32]| grey(name, shape, levels, 1.0))?;
@@ -66,7 +68,7 @@ fn grey<T: Copy + Into<f32>>(name: &str, shape: &[usize], levels: &[T], unit: f3
     };
     let level = |pixel: &[T]| match *pixel {
         [grey] => grey.into() / unit,
-        [r, g, b, ..] => (LUMA[0] * r.into() + LUMA[1] * g.into() + LUMA[2] * b.into()) / unit,
+        [r, g, b, ..] => luma([r.into(), g.into(), b.into()]) / unit,
         _ => 0.0,
     };
     let levels = levels.chunks_exact(channels).map(level).collect();

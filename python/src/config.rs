@@ -6,28 +6,67 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::ThreadPool;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use crate::error;
+
+/// The name that a setting has now, by the keys that lead to the old one.
+fn renamed_key(path: &[&str]) -> Option<&'static str> {
+    match path {
+        ["window"] => Some("vehicle"),
+        _ => None,
+    }
+}
 
 /// Settings by keywords, the others as they are by default; nested ones are dictionaries.
 pub fn from_keywords<T: DeserializeOwned + Default>(
     py: Python<'_>,
     keywords: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<T> {
-    let Some(keywords) = keywords else { return Ok(T::default()) };
-    let text: String = py.import("json")?.call_method1("dumps", (keywords,))?.extract()?;
-    serde_json::from_str(&text).map_err(|error| {
+    match keywords {
+        Some(keywords) => parse(&json(py, keywords)?),
+        None => Ok(T::default()),
+    }
+}
+
+/// The settings of a pipeline, checked; a key that has another name now is refused with that name.
+pub fn config(py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Config> {
+    let Some(keywords) = keywords else { return Ok(Config::default()) };
+    let text = json(py, keywords)?;
+    if let Ok(value) = serde_json::from_str::<Value>(&text)
+        && let Some((old, new)) = renamed(&value, &mut Vec::new())
+    {
+        return Err(PyValueError::new_err(format!("the setting `{old}` is now called `{new}`")));
+    }
+    let config: Config = parse(&text)?;
+    config.check().map_err(error::value)?;
+    Ok(config)
+}
+
+/// Keywords as the text that settings are read from.
+fn json(py: Python<'_>, keywords: &Bound<'_, PyDict>) -> PyResult<String> {
+    py.import("json")?.call_method1("dumps", (keywords,))?.extract()
+}
+
+fn parse<T: DeserializeOwned>(text: &str) -> PyResult<T> {
+    serde_json::from_str(text).map_err(|error| {
         // Lines and columns of the text in between mean nothing to the caller.
         let words = error.to_string();
         PyValueError::new_err(words.split(" at line ").next().unwrap_or(&words).to_owned())
     })
 }
 
-/// The settings of a pipeline, checked.
-pub fn config(py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Config> {
-    let config: Config = from_keywords(py, keywords)?;
-    config.check().map_err(error::value)?;
-    Ok(config)
+/// The first key below `path` that has another name now, as `part.key`, and that name.
+fn renamed<'a>(settings: &'a Value, path: &mut Vec<&'a str>) -> Option<(String, &'static str)> {
+    for (key, value) in settings.as_object()? {
+        path.push(key);
+        let found = renamed_key(path).map(|new| (path.join("."), new)).or_else(|| renamed(value, path));
+        if found.is_some() {
+            return found;
+        }
+        path.pop();
+    }
+    None
 }
 
 /// Every setting with its default, nested as `StereoMotion` takes them.

@@ -3,17 +3,17 @@
 use std::fmt::Display;
 
 use egomotion::estimate;
-use egomotion_io::ChoiceError;
+use egomotion_io::OptionsError;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;
 
-create_exception!(egomotion, ReadError, PyException, "A recording or a file cannot be read.");
+create_exception!(egomotion, FileError, PyException, "A recording or a file cannot be read or written.");
 create_exception!(egomotion, Unsolvable, PyException, "The equations have no answer.");
 
 /// A file that cannot be read or written.
-pub fn read(error: impl Display) -> PyErr {
-    ReadError::new_err(error.to_string())
+pub fn file(error: impl Display) -> PyErr {
+    FileError::new_err(error.to_string())
 }
 
 /// Equations without an answer.
@@ -26,10 +26,10 @@ pub fn value(error: impl Display) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// A choice that has no meaning is a wrong value.
-pub fn choice(error: ChoiceError) -> PyErr {
+/// Options that have no meaning are a wrong value; a file that they need may be at fault too.
+pub fn options(error: OptionsError) -> PyErr {
     match error {
-        ChoiceError::Choice(words) => value(words),
-        ChoiceError::File(error) => read(error),
+        OptionsError::Invalid(words) => value(words),
+        OptionsError::File(error) => file(error),
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use egomotion::metrics::TrajectoryAlignment;
-use egomotion_io::evaluation::{Evaluation, Options};
+use egomotion_io::evaluation::{Evaluation, EvaluationOptions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -16,7 +16,7 @@ use crate::error;
 /// "se3" or "sim3"; `associate` "time" or "row"; `truth_sigma` the truth's own σ from frame to frame in metres and degrees.
 #[pyfunction]
 #[pyo3(signature = (
-    estimate, truth, *, align = "se3", associate = "time", max_diff = 0.01, lengths = None, delta = None,
+    estimate, truth, *, align = "se3", associate = "time", max_diff_s = 0.01, lengths_m = None, deltas = None,
     truth_sigma = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
@@ -26,12 +26,12 @@ pub fn evaluate(
     truth: PathBuf,
     align: &str,
     associate: &str,
-    max_diff: f64,
-    lengths: Option<Vec<f64>>,
-    delta: Option<Vec<String>>,
+    max_diff_s: f64,
+    lengths_m: Option<Vec<f64>>,
+    deltas: Option<Vec<String>>,
     truth_sigma: Option<(f64, f64)>,
 ) -> PyResult<Py<PyAny>> {
-    let own = Options::default();
+    let own = EvaluationOptions::default();
     let known = [TrajectoryAlignment::None, TrajectoryAlignment::Se3, TrajectoryAlignment::Sim3];
     let alignment = known.into_iter().find(|known| known.name() == align);
     let by_time = match associate {
@@ -43,7 +43,7 @@ pub fn evaluate(
             )));
         }
     };
-    let deltas = match delta {
+    let deltas = match deltas {
         None => own.deltas,
         Some(names) => {
             let parsed = names.into_iter().map(|name| {
@@ -54,16 +54,16 @@ pub fn evaluate(
             parsed.collect::<PyResult<_>>()?
         }
     };
-    let lengths_m = lengths.unwrap_or(own.lengths_m);
+    let lengths_m = lengths_m.unwrap_or(own.lengths_m);
     if lengths_m.iter().any(|length| !length.is_finite() || *length <= 0.0) {
-        return Err(PyValueError::new_err("lengths must be positive"));
+        return Err(PyValueError::new_err("lengths_m must be positive"));
     }
     let (t, degrees) = truth_sigma.unwrap_or_default();
     let r = degrees.to_radians();
-    let options = Options {
+    let options = EvaluationOptions {
         format: None,
         by_time,
-        largest_gap_s: max_diff,
+        largest_gap_s: max_diff_s,
         alignment: alignment.ok_or_else(|| {
             PyValueError::new_err(format!("align {align:?} is not known; give 'none', 'se3' or 'sim3'"))
         })?,
@@ -71,7 +71,7 @@ pub fn evaluate(
         deltas,
         truth_sigma: [t, t, t, r, r, r],
     };
-    let found = py.detach(|| Evaluation::of(&estimate, &truth, &options)).map_err(error::read)?;
+    let found = py.detach(|| Evaluation::of(&estimate, &truth, &options)).map_err(error::file)?;
     let mut json = found.json();
     json["warnings"] = found.warnings.into();
     Ok(py.import("json")?.call_method1("loads", (json.to_string(),))?.unbind())

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays;
-use crate::estimate::Estimate;
+use crate::estimators::Estimate;
 use crate::geometry::{Motion, pose};
 
 /// A rectangle of pixels: u, v, width, height.
@@ -40,7 +40,7 @@ impl Impact {
 
     /// 95 % interval in seconds; its far end may be infinite. None where the whole of it recedes.
     #[getter]
-    fn interval95(&self) -> Option<(f64, f64)> {
+    fn interval95_s(&self) -> Option<(f64, f64)> {
         self.impact.interval95_s()
     }
 
@@ -62,7 +62,7 @@ impl Impact {
         self.obstacle.as_ref().map(|obstacle| rectangle(&obstacle.bounds))
     }
 
-    /// Points that will cross the vehicle's window, of an obstacle.
+    /// Points that will cross what the vehicle sweeps, of an obstacle.
     #[getter]
     fn points(&self) -> Option<usize> {
         self.obstacle.as_ref().map(|obstacle| obstacle.points)
@@ -98,7 +98,7 @@ impl MovingGroup {
 
     /// Median depth at the earlier frame, in metres.
     #[getter]
-    fn depth(&self) -> f64 {
+    fn depth_m(&self) -> f64 {
         self.0.depth_m
     }
 
@@ -173,13 +173,13 @@ impl FrameMotion {
 
     /// Time in seconds.
     #[getter]
-    fn time(&self) -> f64 {
+    fn time_s(&self) -> f64 {
         self.answer.time_s
     }
 
     /// Seconds since the earlier frame that it was matched with; None without one.
     #[getter]
-    fn dt(&self) -> Option<f64> {
+    fn dt_s(&self) -> Option<f64> {
         self.answer.dt_s
     }
 
@@ -205,7 +205,7 @@ impl FrameMotion {
         self.estimate().map(Estimate::of)
     }
 
-    /// φ (6,) = (tX, tY, tZ, ΩX, ΩY, ΩZ): motion of the scene relative to the left camera over `dt`, metres and
+    /// φ (6,) = (tX, tY, tZ, ΩX, ΩY, ΩZ): motion of the scene relative to the left camera over `dt_s`, metres and
     /// radians; NaN where it is not determined.
     #[getter]
     fn phi<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
@@ -234,7 +234,7 @@ impl FrameMotion {
         self.truth.as_ref().map(|motion| pose(py, motion)).transpose()
     }
 
-    /// Time to impact of the nearest obstacle in the vehicle's window; None without one.
+    /// Time to impact of the nearest obstacle in what the vehicle sweeps (the settings `vehicle`); None without one.
     #[getter]
     fn impact(&self) -> Option<Impact> {
         self.answer
@@ -246,19 +246,19 @@ impl FrameMotion {
 
     /// One word for why there is no obstacle; None with one.
     #[getter]
-    fn no_obstacle(&self) -> Option<&'static str> {
+    fn no_obstacle_reason(&self) -> Option<&'static str> {
         self.answer.obstacle.as_ref().err().map(|why| why.code())
     }
 
     /// What moves by itself, the largest first.
     #[getter]
-    fn moving(&self) -> Vec<MovingGroup> {
+    fn moving_groups(&self) -> Vec<MovingGroup> {
         self.answer.moving.iter().cloned().map(MovingGroup).collect()
     }
 
     /// By how much matches of left and right lie on different rows, in pixels.
     #[getter]
-    fn row_disagreement(&self) -> Option<f64> {
+    fn row_disagreement_px(&self) -> Option<f64> {
         self.answer.row_disagreement_px
     }
 
@@ -286,7 +286,7 @@ impl FrameMotion {
 
     /// Its covariance (H, W, 3) as uu, uv, vv in px².
     #[getter]
-    fn flow_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
+    fn flow_cov<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
         let dense = self.answer.dense.as_ref();
         dense
             .map(|dense| arrays::planes(py, &[&dense.flow.cov_uu, &dense.flow.cov_uv, &dense.flow.cov_vv]))
@@ -337,7 +337,7 @@ impl FrameMotion {
 
     /// Milliseconds by stage.
     #[getter]
-    fn stages<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn stages_ms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (stages, dict) = (&self.answer.stages, PyDict::new(py));
         for (name, ms) in [
             ("pyramids", stages.pyramids_ms),
@@ -358,7 +358,7 @@ impl FrameMotion {
             format!(", phi=[{}]", parts.collect::<Vec<_>>().join(", "))
         });
         format!(
-            "FrameMotion(frame={}, time={:.3}, status={:?}{phi})",
+            "FrameMotion(frame={}, time_s={:.3}, status={:?}{phi})",
             self.index,
             self.answer.time_s,
             self.status()

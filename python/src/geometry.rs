@@ -78,7 +78,7 @@ pub fn rotation_and_u<'py>(
     py: Python<'py>,
     phi: &Bound<'py, PyAny>,
     dt: f64,
-) -> PyResult<arrays::Two<'py, f64>> {
+) -> PyResult<arrays::ArrayPair<'py, f64>> {
     let (r, u) = twist("phi", phi)?.rotation_and_u(dt);
     Ok((arrays::square(py, &r)?, arrays::square(py, &u)?))
 }
@@ -99,20 +99,20 @@ pub fn seen_from<'py>(
 pub fn velocity<'py>(
     py: Python<'py>,
     phi: &Bound<'py, PyAny>,
-    p: &Bound<'py, PyAny>,
+    points: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (phi, p) = (twist("phi", phi)?, arrays::rows::<3>("p", p)?);
-    arrays::table(py, p.iter().map(|p| phi.velocity(p)))
+    let (phi, points) = (twist("phi", phi)?, arrays::rows::<3>("points", points)?);
+    arrays::table(py, points.iter().map(|p| phi.velocity(p)))
 }
 
-/// Image flow (n, 2) in pixels of points (x, y, Z) (n, 3) under φ (6,), (3).
+/// Image flow (n, 2) in pixels of points (x, y, Z) (n, 3), x and y in pixels and Z in metres, under φ (6,), (3).
 #[pyfunction]
 pub fn image_flow<'py>(
     py: Python<'py>,
     phi: &Bound<'py, PyAny>,
-    xyz: &Bound<'py, PyAny>,
-    focal: f64,
+    xy_depth: &Bound<'py, PyAny>,
+    focal_px: f64,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let (phi, xyz) = (twist("phi", phi)?, arrays::rows::<3>("xyz", xyz)?);
-    arrays::table(py, xyz.iter().map(|p| egomotion::geometry::image_flow(&phi, p.x, p.y, p.z, focal)))
+    let (phi, points) = (twist("phi", phi)?, arrays::rows::<3>("xy_depth", xy_depth)?);
+    arrays::table(py, points.iter().map(|p| egomotion::geometry::image_flow(&phi, p.x, p.y, p.z, focal_px)))
 }

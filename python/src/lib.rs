@@ -1,27 +1,25 @@
 //! The Python package `egomotion`: arguments are converted, nothing is computed here.
 #![deny(missing_docs)]
+#![deny(clippy::disallowed_methods)]
+#![warn(clippy::too_many_lines)]
+#![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
-mod alignment;
 mod arrays;
 mod config;
-mod draws;
 mod error;
-mod estimate;
 mod estimators;
 mod evaluate;
 mod frame_motion;
+mod front_end;
 mod geometry;
-mod measured;
 mod observations;
-mod observe;
 mod pipeline;
 mod recording;
 mod rig;
 mod rows;
 mod signals;
-mod simulate;
+mod simulation;
 mod study;
-mod world;
 
 use pyo3::prelude::*;
 
@@ -29,31 +27,27 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use crate::alignment::{align, align_phi};
-    #[pymodule_export]
     use crate::config::default_config;
     #[pymodule_export]
-    use crate::draws::{Draw, Draws, draws};
+    use crate::error::{FileError, Unsolvable};
     #[pymodule_export]
-    use crate::error::{ReadError, Unsolvable};
-    #[pymodule_export]
-    use crate::estimate::Estimate;
-    #[pymodule_export]
-    use crate::estimators::{irls, least_squares, lmeds, lmeds_search, lmeds_trials, robust_scale, two_step};
+    use crate::estimators::{
+        Estimate, align, align_phi, cramer_rao_bound, errors_in_variables, irls, least_squares, lmeds,
+        lmeds_search, lmeds_trials, maximum_likelihood, robust_scale, two_step,
+    };
     #[pymodule_export]
     use crate::evaluate::evaluate;
     #[pymodule_export]
     use crate::frame_motion::{FrameMotion, Impact, MovingGroup};
     #[pymodule_export]
+    use crate::front_end::{disparity, flow, track};
+    #[pymodule_export]
     use crate::geometry::{exp, image_flow, instantaneous, log, rotation_and_u, seen_from, velocity};
     #[pymodule_export]
-    use crate::measured::{cramer_rao_bound, errors_in_variables, maximum_likelihood};
-    #[pymodule_export]
     use crate::observations::{
-        DepthChanges, DepthFlows, DepthTracks, StereoFlows, StereoTracks, exact_change, smallest_change,
+        DepthChanges, DepthFlows, DepthTracks, StereoFlows, StereoTracks, exact_depth_change,
+        smallest_depth_change,
     };
-    #[pymodule_export]
-    use crate::observe::{disparity, flow, track};
     #[pymodule_export]
     use crate::pipeline::{RgbdMotion, StereoMotion};
     #[pymodule_export]
@@ -63,9 +57,7 @@ mod _native {
     #[pymodule_export]
     use crate::rows::Rows;
     #[pymodule_export]
-    use crate::simulate::simulate;
+    use crate::simulation::{Sequence, simulate};
     #[pymodule_export]
-    use crate::study::Study;
-    #[pymodule_export]
-    use crate::world::Sequence;
+    use crate::study::{Study, StudyDraw, StudyDraws, study_draws};
 }

@@ -10,7 +10,7 @@ use crate::arrays;
 use crate::config::{Threads, config};
 use crate::error;
 use crate::frame_motion::FrameMotion;
-use crate::observe::{given_flow, given_map};
+use crate::front_end::{precomputed_disparity, precomputed_flow};
 use crate::rig::Rig;
 
 /// Turns a sequence of rectified stereo images into motion.
@@ -47,15 +47,15 @@ impl StereoMotion {
         Ok(Self { motion, threads: Threads::new(threads)? })
     }
 
-    /// The motion from the last good frame to this one, at `time` in seconds.
+    /// The motion from the last good frame to this one, at `time_s` in seconds.
     ///
     /// Images are (H, W), or (H, W, 3) as red, green, blue; uint8, uint16 (0 … 65535) or float32
     /// (0 … 255). With `disparity` (H, W), and perhaps
     /// its `disparity_sigma`, of the left image's pixels that map is used in place of our own, and the right image may
-    /// be None. With `flow` (H, W, 2), and perhaps its `flow_covariance` (H, W, 3) as uu, uv, vv, from the left image of the
+    /// be None. With `flow` (H, W, 2), and perhaps its `flow_cov` (H, W, 3) as uu, uv, vv, from the left image of the
     /// frame before to this one, on the earlier one's pixels, that is used too. An image that cannot be used is no exception: the answer's status says why.
     #[pyo3(signature = (
-        left, right, time, *, disparity = None, disparity_sigma = None, flow = None, flow_covariance = None
+        left, right, time_s, *, disparity = None, disparity_sigma = None, flow = None, flow_cov = None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn push(
@@ -63,22 +63,22 @@ impl StereoMotion {
         py: Python<'_>,
         left: &Bound<'_, PyAny>,
         right: Option<&Bound<'_, PyAny>>,
-        time: f64,
+        time_s: f64,
         disparity: Option<&Bound<'_, PyAny>>,
         disparity_sigma: Option<&Bound<'_, PyAny>>,
         flow: Option<&Bound<'_, PyAny>>,
-        flow_covariance: Option<&Bound<'_, PyAny>>,
+        flow_cov: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<FrameMotion> {
         let left = arrays::image("left", left)?;
         let right = right.map(|right| arrays::image("right", right)).transpose()?;
-        let disparity = given_map(disparity, disparity_sigma)?;
-        if let Some(flow) = given_flow(flow, flow_covariance)? {
+        let disparity = precomputed_disparity(disparity, disparity_sigma)?;
+        if let Some(flow) = precomputed_flow(flow, flow_cov)? {
             self.motion.set_flow(flow).map_err(error::value)?;
         }
         if right.is_none() && disparity.is_none() {
             return Err(PyValueError::new_err("give the right image, or a disparity map"));
         }
-        let frame = Frame { time_s: time, left, right, disparity, flow: None };
+        let frame = Frame { time_s, left, right, disparity, flow: None };
         let motion = &mut self.motion;
         Ok(FrameMotion::of(self.threads.run(py, || motion.push(frame))))
     }
@@ -98,21 +98,21 @@ impl RgbdMotion {
     /// `noise` is "kinect" (structured light), "time-of-flight" or "exact"; other keywords are the settings of
     /// `default_config()`.
     #[new]
-    #[pyo3(signature = (focal, centre, size, *, focal_y = None, noise = "kinect", threads = None, **settings))]
+    #[pyo3(signature = (focal_px, centre_px, size_px, *, focal_y_px = None, noise = "kinect", threads = None, **settings))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn new(
         py: Python<'_>,
-        focal: f64,
-        centre: (f64, f64),
-        size: (usize, usize),
-        focal_y: Option<f64>,
+        focal_px: f64,
+        centre_px: (f64, f64),
+        size_px: (usize, usize),
+        focal_y_px: Option<f64>,
         noise: &str,
         threads: Option<usize>,
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let mut rig = egomotion::geometry::StereoRig::new(focal, centre, VIRTUAL_BASELINE_M, size)
+        let mut rig = egomotion::geometry::StereoRig::new(focal_px, centre_px, VIRTUAL_BASELINE_M, size_px)
             .map_err(error::value)?;
-        rig.focal_y_px = focal_y.unwrap_or(focal);
+        rig.focal_y_px = focal_y_px.unwrap_or(focal_px);
         let noise = match noise {
             "kinect" => DepthNoise::kinect(),
             "time-of-flight" => DepthNoise::time_of_flight(),
@@ -134,10 +134,10 @@ impl RgbdMotion {
         py: Python<'_>,
         image: &Bound<'_, PyAny>,
         depth: &Bound<'_, PyAny>,
-        time: f64,
+        time_s: f64,
     ) -> PyResult<FrameMotion> {
         let (image, depth) = (arrays::image("image", image)?, arrays::field("depth", depth)?);
         let motion = &mut self.motion;
-        Ok(FrameMotion::of(self.threads.run(py, || motion.push(time, image, &depth))))
+        Ok(FrameMotion::of(self.threads.run(py, || motion.push(time_s, image, &depth))))
     }
 }

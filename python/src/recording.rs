@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use egomotion::pipeline::Trajectory;
 use egomotion_io::Source;
-use egomotion_io::recording::{Choice, Fetched, Pipeline, Recording, Sensor, read_ahead};
+use egomotion_io::recording::{Pipeline, Recording, RecordingOptions, Sensor, SourceFrame, read_ahead};
 use egomotion_io::source::Sequence;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -21,7 +21,7 @@ use crate::rig::Rig;
 #[pyfunction]
 #[pyo3(signature = (path, *, calibration = None))]
 pub fn sequences(py: Python<'_>, path: PathBuf, calibration: Option<PathBuf>) -> PyResult<Vec<String>> {
-    let source = py.detach(|| Source::open_with(&path, calibration.as_deref())).map_err(error::read)?;
+    let source = py.detach(|| Source::open_with(&path, calibration.as_deref())).map_err(error::file)?;
     Ok(source.sequences.into_iter().map(|sequence| sequence.name).collect())
 }
 
@@ -70,13 +70,22 @@ pub fn run(
     let [disparity, flow, tracks] = [("disparity", disparity), ("flow", flow), ("tracks", tracks)]
         .map(|(name, given)| file_or_settings(name, given, &settings));
     let (disparity, flow, tracks) = (disparity?, flow?, tracks?);
-    let choice =
-        Choice { start, frames, stride: Some(stride), reverse, sensor, disparity, flow, tracks, mask };
+    let choice = RecordingOptions {
+        start,
+        frames,
+        stride: Some(stride),
+        reverse,
+        sensor,
+        disparity,
+        flow,
+        tracks,
+        mask,
+    };
     let (config, threads) = (config(py, Some(&settings))?, Threads::new(threads)?);
     let (name, recording) = py.detach(|| -> PyResult<_> {
-        let source = Source::open_with(&path, calibration.as_deref()).map_err(error::read)?;
+        let source = Source::open_with(&path, calibration.as_deref()).map_err(error::file)?;
         let found = named(source, sequence)?;
-        Ok((found.name.clone(), Recording::open(&path, &found, &choice).map_err(error::choice)?))
+        Ok((found.name.clone(), Recording::open(&path, &found, &choice).map_err(error::options)?))
     })?;
     let pipeline = recording.pipeline(&config).map_err(error::value)?;
     let recording = Arc::new(recording);
@@ -131,7 +140,7 @@ fn named(source: Source, name: Option<&str>) -> PyResult<Sequence> {
 pub struct Run {
     name: String,
     recording: Arc<Recording>,
-    fetched: Mutex<Receiver<Fetched>>,
+    fetched: Mutex<Receiver<SourceFrame>>,
     pipeline: Pipeline,
     trajectory: Trajectory,
     threads: Threads,
@@ -162,8 +171,8 @@ impl Run {
     fn __next__(&mut self, py: Python<'_>) -> PyResult<Option<FrameMotion>> {
         let Self { fetched, pipeline, threads, .. } = self;
         let pushed = threads.run(py, || {
-            let Fetched { index, time_s, frame, truth, .. } = fetched.get_mut().ok()?.recv().ok()?;
-            Some((index, truth, pipeline.push(time_s, frame)))
+            let SourceFrame { index, time_s, input, truth, .. } = fetched.get_mut().ok()?.recv().ok()?;
+            Some((index, truth, pipeline.push(time_s, input)))
         });
         let Some((index, truth, answer)) = pushed else { return Ok(None) };
         self.trajectory.push(&answer);
@@ -190,7 +199,7 @@ impl Run {
 
     /// Their times (n,) in seconds.
     #[getter]
-    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, numpy::PyArray1<f64>> {
+    fn times_s<'py>(&self, py: Python<'py>) -> Bound<'py, numpy::PyArray1<f64>> {
         numpy::PyArray1::from_slice(py, self.trajectory.times_s())
     }
 

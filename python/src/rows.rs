@@ -20,8 +20,8 @@ pub struct Rows {
     block: Vec<usize>,
 }
 
-/// Most unknowns.
-pub const MOST: usize = 6;
+/// The most unknowns of an equation: the six components of φ.
+pub const MAX_UNKNOWNS: usize = 6;
 
 /// Call `$body` with N the number of unknowns.
 macro_rules! with_unknowns {
@@ -59,7 +59,7 @@ impl Rows {
     /// Equations in φ.
     pub fn of_six(rows: Vec<(Vector6<f64>, f64, f64, usize)>) -> Self {
         Self {
-            unknowns: MOST,
+            unknowns: MAX_UNKNOWNS,
             a: rows.iter().flat_map(|row| <[f64; 6]>::from(row.0)).collect(),
             b: rows.iter().map(|row| row.1).collect(),
             sigma: rows.iter().map(|row| row.2).collect(),
@@ -91,9 +91,9 @@ impl Rows {
         block: Option<Vec<usize>>,
     ) -> PyResult<Self> {
         let (n, unknowns, a) = arrays::numbers("a", a, |shape, values| match *shape {
-            [n, unknowns @ 1..=MOST] => Ok((n, unknowns, values.to_vec())),
+            [n, unknowns @ 1..=MAX_UNKNOWNS] => Ok((n, unknowns, values.to_vec())),
             _ => {
-                let words = format!("a has shape {shape:?}; give (n, k) with k from 1 to {MOST}");
+                let words = format!("a has shape {shape:?}; give (n, k) with k from 1 to {MAX_UNKNOWNS}");
                 Err(PyValueError::new_err(words))
             }
         })?;

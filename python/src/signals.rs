@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 
-/// How long Ctrl-C may wait.
-const PATIENCE: Duration = Duration::from_millis(50);
+/// Time between two looks at Ctrl-C: it may wait so long, and the interpreter is woken so often.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The answer of work on a thread of its own, or the exception of a signal that comes meanwhile.
 ///
@@ -21,7 +21,7 @@ pub fn interruptible<T: Send + 'static>(
     let receiver = Mutex::new(receiver);
     // Nobody hears of it any more if the receiver has gone.
     let worker = thread::spawn(move || drop(sender.send(work())));
-    let answer = || receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(PATIENCE);
+    let answer = || receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(SIGNAL_INTERVAL);
     loop {
         match py.detach(answer) {
             Ok(answer) => return Ok(answer),

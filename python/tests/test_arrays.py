@@ -157,7 +157,7 @@ CALLS: list[Callable[[Any, Any], object]] = [
     lambda a, b: em.cramer_rao_bound(em.StereoTracks(a, a, b, b), RIG, np.zeros(6)),
     lambda a, b: em.StereoFlows(a, b, np.ones(4)).depth_velocity(RIG),
     lambda a, b: em.errors_in_variables(em.DepthChanges(a, b, a, np.ones(4), np.ones(2)), RIG),
-    lambda a, b: em.exact_change(a, b, a, RIG),
+    lambda a, b: em.exact_depth_change(a, b, a, RIG),
 ]
 
 

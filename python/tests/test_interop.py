@@ -53,7 +53,7 @@ KINDS = [Dlpack, Buffer, torch_tensor, memoryview, flat]
 def test_images_and_maps(kind: Callable[[Any], Any]) -> None:
     for plain, found in zip(em.disparity(GREY, GREY), em.disparity(kind(GREY), kind(GREY))):
         np.testing.assert_array_equal(plain, found)
-    world = em.Sequence("C", size=(160, 120), frames=2)
+    world = em.Sequence("C", size_px=(160, 120), frames=2)
 
     def pushed(take: Callable[[Any], Any]) -> em.FrameMotion:
         motion = em.StereoMotion(world.rig)

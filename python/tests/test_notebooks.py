@@ -46,7 +46,7 @@ def test_motion_of_a_recording_of_ones_own(tmp_path: Path, monkeypatch: pytest.M
 
     recording, folder = tmp_path / "recording", tmp_path / "empty"
     folder.mkdir()
-    em.simulate("drive", recording, frames=6, size=(160, 120))
+    em.simulate("drive", recording, frames=6, size_px=(160, 120))
     # A recording whose motion nobody knows.
     (recording / "poses.txt").unlink()
     monkeypatch.setenv("EGOMOTION_RECORDING", str(recording))

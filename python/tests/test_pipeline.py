@@ -2,6 +2,7 @@
 
 import json
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,10 @@ def inside(answer: em.FrameMotion, truth: Any, sigmas: float = 4.0) -> bool:
 def test_motion_and_maps_of_a_rendered_sequence() -> None:
     answers = pushed(em.StereoMotion(C.rig))
     assert [answer.status for answer in answers] == ["first", "ok", "ok"]
-    assert answers[0].dt is None and answers[0].reason == "no earlier frame"
+    assert answers[0].dt_s is None and answers[0].reason == "no earlier frame"
     for k, answer in enumerate(answers[1:]):
         assert inside(answer, C.phi(k))
-        assert answer.frame == k + 1 and answer.dt == pytest.approx(0.1)
+        assert answer.frame == k + 1 and answer.dt_s == pytest.approx(0.1)
         np.testing.assert_allclose(answer.covariance, answer.covariance.T, rtol=1e-12)
         truth = C.truth(k)
         for found, sigma, true in [
@@ -44,12 +45,12 @@ def test_motion_and_maps_of_a_rendered_sequence() -> None:
             known = np.isfinite(z)
             assert known.mean() > 0.8
             assert (np.abs(z[known]) < 2).mean() > 0.85
-        assert answer.flow is not None and answer.flow_covariance is not None
+        assert answer.flow is not None and answer.flow_cov is not None
         assert np.nanmedian(np.abs(answer.flow - truth["flow"])) < 0.1
         assert answer.looming is not None and answer.impact_map is not None
         near = answer.looming > 0
         np.testing.assert_allclose(answer.impact_map[near], 1 / answer.looming[near], rtol=1e-5)
-        assert set(answer.stages) == {"pyramids", "disparity", "tracks", "flow", "estimate", "maps"}
+        assert set(answer.stages_ms) == {"pyramids", "disparity", "tracks", "flow", "estimate", "maps"}
 
 
 def test_types_threads_and_repetition_give_the_same_bits() -> None:
@@ -77,6 +78,21 @@ def test_settings_reach_the_pipeline() -> None:
     assert few.motion is not None and few.motion.rows < 150
 
 
+def test_a_renamed_setting_is_refused_with_its_new_name(tmp_path: Path) -> None:
+    calls: list[Callable[..., object]] = [
+        lambda **settings: em.StereoMotion(C.rig, **settings),
+        lambda **settings: em.RgbdMotion(100.0, (15.5, 11.5), (32, 24), **settings),
+        lambda **settings: em.run(tmp_path, **settings),
+    ]
+    for call in calls:
+        with pytest.raises(ValueError, match="the setting `window` is now called `vehicle`"):
+            call(window={"width_m": 2.0})
+    assert "vehicle" in em.default_config() and "window" not in em.default_config()
+    # The same word elsewhere is no renamed setting.
+    with pytest.raises(ValueError, match="unknown field `window`"):
+        em.StereoMotion(C.rig, tracks={"window": 5})
+
+
 def test_own_disparity_takes_the_place_of_ours() -> None:
     maps = [em.disparity(*pair) for pair in FRAMES[:2]]
     own = em.StereoMotion(C.rig)
@@ -91,7 +107,7 @@ def test_own_flow_takes_the_place_of_ours() -> None:
     flow, covariance = em.flow(FRAMES[0][0], FRAMES[1][0])
     own = em.StereoMotion(C.rig)
     own.push(*FRAMES[0], 0.0)
-    answer = own.push(*FRAMES[1], 0.1, flow=flow, flow_covariance=covariance)
+    answer = own.push(*FRAMES[1], 0.1, flow=flow, flow_cov=covariance)
     assert answer.status == "ok" and answer.flow is not None
     known = np.isfinite(flow[..., 0])
     assert np.array_equal(answer.flow[known], flow[known])
@@ -106,8 +122,8 @@ def test_own_flow_takes_the_place_of_ours() -> None:
     wrongs: list[tuple[dict[str, Any], str]] = [
         ({"flow": flow[..., 0]}, "give \\(height, width, 2\\)"),
         ({"flow": np.zeros(flow.shape, np.int32)}, "flow has dtype int32"),
-        ({"flow_covariance": covariance}, "flow_covariance needs flow"),
-        ({"flow": flow, "flow_covariance": covariance[1:]}, "differ in size"),
+        ({"flow_cov": covariance}, "flow_cov needs flow"),
+        ({"flow": flow, "flow_cov": covariance[1:]}, "differ in size"),
         ({"flow": flow[1:]}, "the flow is 320x239, the rig 320x240"),
     ]
     for wrong, words in wrongs:
@@ -121,11 +137,11 @@ def test_the_nearest_obstacle_has_a_time_and_a_place() -> None:
     drive = em.Sequence("drive", frames=2)
     motion = em.StereoMotion(drive.rig)
     for k in range(2):
-        answer = motion.push(*drive.render(k, samples=2), k * drive.interval)
-    assert answer.impact is not None and answer.no_obstacle is None and answer.impact_map is not None
+        answer = motion.push(*drive.render(k, samples=2), k * drive.interval_s)
+    assert answer.impact is not None and answer.no_obstacle_reason is None and answer.impact_map is not None
     impact = answer.impact
-    assert impact.seconds is not None and impact.interval95 is not None and impact.bounds is not None
-    low, high = impact.interval95
+    assert impact.seconds is not None and impact.interval95_s is not None and impact.bounds is not None
+    low, high = impact.interval95_s
     assert 0 < low < impact.seconds < high
     assert impact.looming == pytest.approx(1 / impact.seconds) and impact.looming_sigma > 0
     u, v, width, height = impact.bounds
@@ -135,7 +151,7 @@ def test_the_nearest_obstacle_has_a_time_and_a_place() -> None:
 
 def test_depth_camera() -> None:
     rig = C.rig
-    motion = em.RgbdMotion(rig.focal, rig.centre, rig.size, noise="exact", observe="sparse")
+    motion = em.RgbdMotion(rig.focal_px, rig.centre_px, rig.size_px, noise="exact", observe="sparse")
     for k in range(2):
         answer = motion.push(FRAMES[k][0], C.truth(k)["depth"], 0.1 * k)
     assert answer.status == "ok"
@@ -198,12 +214,12 @@ def test_evaluate(tmp_path: Path) -> None:
     truth, estimate = tmp_path / "truth.txt", tmp_path / "estimate.txt"
     truth.write_text("".join(f"{0.1 * k} {k} 0 0 0 0 0 1\n" for k in range(12)))
     estimate.write_text("".join(f"{0.1 * k} {1.01 * k} 0 0 0 0 0 1\n" for k in range(12)))
-    found = em.evaluate(estimate, truth, align="none", lengths=[5.0], delta=["2f"])
+    found = em.evaluate(estimate, truth, align="none", lengths_m=[5.0], deltas=["2f"])
     assert found["frames"] == 12 and found["t_rmse_m"] == pytest.approx(0.01)
     # KITTI's segments end at the first pose beyond the length: here six steps of 1 cm each for 5 m.
     assert found["drift_percent"] == pytest.approx(6 / 5)
     assert found["relative"][0]["translation_m"]["mean"] == pytest.approx(0.02)
-    with pytest.raises(em.ReadError, match="nowhere.txt"):
+    with pytest.raises(em.FileError, match="nowhere.txt"):
         em.evaluate(tmp_path / "nowhere.txt", truth)
     with pytest.raises(ValueError, match='delta "2x"'):
-        em.evaluate(estimate, truth, delta=["2x"])
+        em.evaluate(estimate, truth, deltas=["2x"])

@@ -45,7 +45,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of three recordings and one that is none."""
     folder = tmp_path_factory.mktemp("recordings")
     for name, frames in (("A", 6), ("C", 6), ("drive", 30)):
-        em.simulate(name, folder / name, frames=frames, size=(160, 120))
+        em.simulate(name, folder / name, frames=frames, size_px=(160, 120))
     (folder / "empty").mkdir()
     return folder
 

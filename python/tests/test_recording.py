@@ -18,19 +18,19 @@ DATA = Path(os.environ.get("EGOMOTION_DATA", Path(__file__).resolve().parents[3]
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("recordings") / "drive"
-    assert em.simulate("drive", folder, frames=6, size=(160, 120)) == 6
+    assert em.simulate("drive", folder, frames=6, size_px=(160, 120)) == 6
     return folder
 
 
 def test_a_recording_frame_by_frame(rendered: Path) -> None:
     run = em.run(rendered, threads=1)
     assert em.sequences(rendered) == [run.name] == ["drive"]
-    assert len(run) == 6 and run.rig.size == (160, 120)
+    assert len(run) == 6 and run.rig.size_px == (160, 120)
     answers = list(run)
     assert [m.frame for m in answers] == list(range(6)) and [m.status for m in answers[1:]] == ["ok"] * 5
     assert list(run) == []
-    assert run.poses.shape == (6, 4, 4) and run.times.shape == (6,)
-    world = em.Sequence("drive", frames=6, size=(160, 120))
+    assert run.poses.shape == (6, 4, 4) and run.times_s.shape == (6,)
+    world = em.Sequence("drive", frames=6, size_px=(160, 120))
     for k, m in enumerate(answers[1:]):
         assert np.abs(m.phi - world.phi(k)).max() < 2e-3
         pose, truth = m.pose, m.true_pose
@@ -48,14 +48,14 @@ def test_choices(rendered: Path) -> None:
     few, many = (list(em.run(rendered, observe="sparse", frames=2, tracks={"corners": n}))[1] for n in (60, 600))
     assert few.motion is not None and many.motion is not None and few.motion.rows < many.motion.rows
     refusals: list[tuple[type[Exception], str, Callable[[], object]]] = [
-        (em.ReadError, "nowhere", lambda: em.run(rendered / "nowhere")),
+        (em.FileError, "nowhere", lambda: em.run(rendered / "nowhere")),
         (ValueError, "start 9 is past", lambda: em.run(rendered, start=9)),
         (ValueError, "stride is 0", lambda: em.run(rendered, stride=0)),
         (ValueError, "has no depth images", lambda: em.run(rendered, sensor="depth")),
         (ValueError, "no sequence 'other'|no sequence \"other\"", lambda: em.run(rendered, sequence="other")),
         (ValueError, "unknown field", lambda: em.run(rendered, metod="ml")),
         (ValueError, "unknown field `cornets`", lambda: em.run(rendered, tracks={"cornets": 5})),
-        (em.ReadError, "nowhere.npz", lambda: em.run(rendered, tracks=rendered / "nowhere.npz")),
+        (em.FileError, "nowhere.npz", lambda: em.run(rendered, tracks=rendered / "nowhere.npz")),
     ]
     for error, words, call in refusals:
         with pytest.raises(error, match=words):

@@ -29,10 +29,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[em.Run, list[em.Frame
     import egomotion.rerun
 
     folder = tmp_path_factory.mktemp("rerun")
-    em.simulate("demo", folder / "demo", frames=4, size=SIZE)
+    em.simulate("demo", folder / "demo", frames=4, size_px=SIZE)
     run = em.run(folder / "demo")
     answers = list(run)
-    world = em.Sequence("demo", frames=4, size=SIZE)
+    world = em.Sequence("demo", frames=4, size_px=SIZE)
     recording = rr.RecordingStream("egomotion_test")
     recording.save(folder / "demo.rrd")
     for m in answers:
@@ -48,13 +48,13 @@ def test_time_pose_and_camera(run: tuple[em.Run, list[em.FrameMotion], dict[str,
     assert sorted(camera) == [0, 1, 2, 3]
     for m, pose in zip(answers, recording.poses):
         row = camera[m.frame]
-        assert row["time"].total_seconds() == pytest.approx(m.time)
+        assert row["time"].total_seconds() == pytest.approx(m.time_s)
         np.testing.assert_allclose(row["Transform3D:translation"][0], pose[:3, 3], atol=1e-6)
         # Column by column.
         np.testing.assert_allclose(np.reshape(row["Transform3D:mat3x3"][0], (3, 3)).T, pose[:3, :3], atol=1e-6)
         pinhole = found["/rig/camera/before/image"][m.frame]
         assert pinhole["Pinhole:resolution"] == [[160, 120]]
-        assert pinhole["Pinhole:image_from_camera"][0][0] == pytest.approx(recording.rig.focal)
+        assert pinhole["Pinhole:image_from_camera"][0][0] == pytest.approx(recording.rig.focal_px)
     # The camera of the maps is where the frame before was.
     now, then = camera[3], found["/rig/camera/before"][3]
     rotation = np.reshape(now["Transform3D:mat3x3"][0], (3, 3)).T
@@ -92,7 +92,7 @@ def test_series(run: tuple[em.Run, list[em.FrameMotion], dict[str, Any]]) -> Non
         if m.impact is None or m.impact.seconds is None:
             assert "Clear:is_recursive" in row
         else:
-            assert row["Scalars:scalars"] == [m.impact.seconds, *(m.impact.interval95 or ())]
+            assert row["Scalars:scalars"] == [m.impact.seconds, *(m.impact.interval95_s or ())]
     assert any(m.impact is not None for m in answers)
 
 
@@ -113,9 +113,9 @@ def test_what_moves_and_frames_without_files(tmp_path: Path) -> None:
         egomotion.rerun.log(m, rig=world.rig, pose=(np.eye(3), [0, 0, k]), recording=recording)
     recording.disconnect()
     found = logged(tmp_path / "moves.rrd")
-    assert len(m.moving) > 0
+    assert len(m.moving_groups) > 0
     boxes = found["/egomotion/camera/before/image/moving"][2]
-    u, v, width, height = m.moving[0].bounds
+    u, v, width, height = m.moving_groups[0].bounds
     assert boxes["Boxes2D:centers"][0] == [u + width / 2, v + height / 2]
     assert boxes["Boxes2D:half_sizes"][0] == [width / 2, height / 2]
     assert found["/egomotion/camera"][2]["Transform3D:translation"] == [[0, 0, 2]]

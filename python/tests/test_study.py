@@ -17,13 +17,13 @@ SETTINGS: dict[str, Any] = {"sequence": "C", "draws": 6, "measuring": {"features
 def test_a_method_on_the_draws_has_the_figures_of_the_study() -> None:
     """Rigid alignment of the triangulated points, the study's `rigid` by least squares, done here by hand."""
     errors = []
-    for draw in em.draws("discrete", **SETTINGS):
-        assert isinstance(draw.motions, em.StereoTracks)
-        before, after = draw.rig.point(draw.motions.before), draw.rig.point(draw.motions.after)
+    for draw in em.study_draws("discrete", **SETTINGS):
+        assert isinstance(draw.binocular_flow, em.StereoTracks)
+        before, after = draw.rig.point(draw.binocular_flow.before), draw.rig.point(draw.binocular_flow.after)
         there = (before[:, 2] > 0) & (after[:, 2] > 0)
         rotation, translation = em.align(before[there], after[there])
-        found = em.seen_from(em.log(rotation, translation), draw.centre)
-        truth = em.seen_from(draw.phi, draw.centre)
+        found = em.seen_from(em.log(rotation, translation), draw.cyclopean_centre)
+        truth = em.seen_from(draw.phi, draw.cyclopean_centre)
         errors.append(np.abs(found - truth)[:3] / np.abs(truth[:3]))
     table = em.Study("table", **SETTINGS).tables()["table"]
     rows = [dict(zip(table, values)) for values in zip(*table.values())]
@@ -35,21 +35,21 @@ def test_a_method_on_the_draws_has_the_figures_of_the_study() -> None:
 
 
 def test_a_draw_holds_truth_and_measurements() -> None:
-    draws = em.draws("differential", **{**SETTINGS, "draws": 1})
+    draws = em.study_draws("differential", **{**SETTINGS, "draws": 1})
     assert len(draws) == 1
     [draw] = draws
-    assert isinstance(draw.motions, em.StereoFlows) and isinstance(draw.changes, em.DepthFlows)
+    assert isinstance(draw.binocular_flow, em.StereoFlows) and isinstance(draw.dcce, em.DepthFlows)
     n = len(draw)
-    assert draw.motions.measured.shape == (n, 4) and draw.motions.measured_cov.shape == (n, 4, 4)
-    assert draw.changes.xy.shape == draw.changes.flow.shape == (n, 2) and draw.exact is None
-    assert np.array_equal(draw.changes.disparity[:, 0], draw.motions.measured[:, 0])
+    assert draw.binocular_flow.measured.shape == (n, 4) and draw.binocular_flow.measured_cov.shape == (n, 4, 4)
+    assert draw.dcce.xy.shape == draw.dcce.flow.shape == (n, 2) and draw.exact_tracks is None
+    assert np.array_equal(draw.dcce.disparity[:, 0], draw.binocular_flow.measured[:, 0])
     # Both cameras' v_y together are surer than one.
-    assert isinstance(draw.complete, em.StereoFlows)
-    assert np.allclose(draw.complete.measured_cov[:, 2, 2], 0.5 * draw.motions.measured_cov[:, 2, 2])
-    [draw] = em.draws("discrete", **{**SETTINGS, "draws": 1})
-    assert isinstance(draw.motions, em.StereoTracks) and isinstance(draw.changes, em.DepthTracks)
-    assert draw.exact is not None and len(draw) == 300
-    z_before, z_after = (draw.rig.point(at)[:, 2] for at in (draw.exact.before, draw.exact.after))
+    assert isinstance(draw.maximum_likelihood, em.StereoFlows)
+    assert np.allclose(draw.maximum_likelihood.measured_cov[:, 2, 2], 0.5 * draw.binocular_flow.measured_cov[:, 2, 2])
+    [draw] = em.study_draws("discrete", **{**SETTINGS, "draws": 1})
+    assert isinstance(draw.binocular_flow, em.StereoTracks) and isinstance(draw.dcce, em.DepthTracks)
+    assert draw.exact_tracks is not None and len(draw) == 300
+    z_before, z_after = (draw.rig.point(at)[:, 2] for at in (draw.exact_tracks.before, draw.exact_tracks.after))
     assert np.allclose(z_after - z_before, draw.depth_velocity, atol=1e-9)
 
 
@@ -76,7 +76,7 @@ def test_settings_without_a_meaning_are_named(name: str, settings: dict[str, Any
 
 def test_draws_are_of_a_known_approach() -> None:
     with pytest.raises(ValueError, match="no approach 'both'|no approach \"both\""):
-        em.draws("both")  # type: ignore[arg-type]
+        em.study_draws("both")  # type: ignore[arg-type]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of Unix")

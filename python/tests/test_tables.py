@@ -12,7 +12,7 @@ from egomotion import tables
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[em.Run, list[em.FrameMotion]]:
     folder: Path = tmp_path_factory.mktemp("tables") / "drive"
-    em.simulate("drive", folder, frames=4, size=(160, 120))
+    em.simulate("drive", folder, frames=4, size_px=(160, 120))
     run = em.run(folder, observe="sparse")
     return run, list(run)
 

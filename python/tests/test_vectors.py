@@ -157,7 +157,7 @@ def test_exact_depth_change(case: dict[str, float]) -> None:
     u, v = np.meshgrid(np.arange(24), np.arange(24))
     plane = (case["a"] + case["p"] * u + case["q"] * v).astype(np.float32)
     place = [[case["u"] + case["vx"], case["v"] + case["vy"]]]
-    change = em.exact_change([case["Z"]], plane, place, RIG)[0]
+    change = em.exact_depth_change([case["Z"]], plane, place, RIG)[0]
     # The plane is float32.
     assert abs(change - case["VZ"]) < 1e-6 * case["Z"]
 
@@ -224,7 +224,7 @@ def test_lmeds_exhaustive(case: dict[str, Any]) -> None:
 
 def test_resolution() -> None:
     for case in ALL["resolution51_mm"]:
-        close(1000 * em.smallest_change([case["d"]], case["step"], RIG)[0], case["dZ_mm"])
+        close(1000 * em.smallest_depth_change([case["d"]], case["step"], RIG)[0], case["dZ_mm"])
 
 
 @pytest.mark.parametrize("case", ALL["fused"])

@@ -18,7 +18,7 @@ use crate::run::set_threads;
 use crate::session::{Outcome, Row, Session, progress, stop_signal};
 use crate::summary::Summary;
 use crate::terminal;
-use egomotion_io::recording::{Fetched, Given};
+use egomotion_io::recording::{FrameInput, SourceFrame};
 use egomotion_report::run::Eyes;
 
 /// Rays along each side of a pixel that shows an edge.
@@ -82,16 +82,16 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
     Ok(if outcome.complete { Ending::Done } else { Ending::Interrupted })
 }
 
-fn render(sequence: &Sequence, noise: &SensorNoise, k: usize) -> Fetched {
+fn render(sequence: &Sequence, noise: &SensorNoise, k: usize) -> SourceFrame {
     let start = Instant::now();
     let images = sequence.view(k).map(|view| noise.expose(&view.render(SAMPLES), k as u64));
     let time_s = sequence.interval_s * k as f64;
-    Fetched {
+    SourceFrame {
         index: k,
         time_s,
-        frame: images
+        input: images
             .map(|StereoImages { left, right }| {
-                Given::Frame(Box::new(StereoFrame { time_s, left, right }.into()))
+                FrameInput::Images(Box::new(StereoFrame { time_s, left, right }.into()))
             })
             .ok_or(Unanswered::First),
         truth: sequence.world_from_left(k),

@@ -4,7 +4,7 @@ use std::io::Write as _;
 
 use anyhow::Result;
 use egomotion::metrics::TrajectoryAlignment;
-use egomotion_io::evaluation::{Evaluation, Options, Stated};
+use egomotion_io::evaluation::{Evaluation, EvaluationOptions, StatedUncertainty};
 
 use crate::args::EvaluateArgs;
 use crate::terminal::{self, tell};
@@ -29,7 +29,7 @@ pub fn evaluate(args: &EvaluateArgs) -> Result<Ending> {
     Ok(Ending::Done)
 }
 
-fn text(found: &Evaluation, options: &Options) -> String {
+fn text(found: &Evaluation, options: &EvaluationOptions) -> String {
     let mut text = format!("{} poses, associated by {}\n", found.poses, found.associated_by);
     let step = &found.step;
     text += &format!(
@@ -39,7 +39,7 @@ fn text(found: &Evaluation, options: &Options) -> String {
         1e3 * step.t_median_m,
         step.r_median_deg
     );
-    for over in &found.over {
+    for over in &found.relative {
         text += &format!(
             "over {}: {:.3} mm, {:.5}° (root mean square of {} pairs)\n",
             over.name,
@@ -77,7 +77,7 @@ fn text(found: &Evaluation, options: &Options) -> String {
     text
 }
 
-fn in_words(stated: &Stated) -> String {
+fn in_words(stated: &StatedUncertainty) -> String {
     format!(
         "stated uncertainty: NEES/6 {:.2}; {:.1} % of {} components in their 95 % interval\n",
         stated.nees.per_degree().unwrap_or(f64::NAN),

@@ -72,7 +72,7 @@ fn print_sequence(out: &mut impl std::io::Write, sequence: &Sequence) -> Result<
         }
     }
     let poses = frames.iter().filter(|frame| frame.truth.is_some()).count();
-    let maps = sequence.truth_maps.as_ref().map_or("", |_| ", maps of disparity and flow");
+    let maps = sequence.truth_files.as_ref().map_or("", |_| ", maps of disparity and flow");
     if poses > 0 || !maps.is_empty() {
         writeln!(out, "  truth     poses of {poses} frames{maps}")?;
     }

@@ -4,7 +4,7 @@ use anyhow::Result;
 use egomotion::geometry::{Field, StereoRig};
 use egomotion::metrics::{self, Nees};
 use egomotion::pipeline::DenseResults;
-use egomotion_io::source::TruthMaps;
+use egomotion_io::source::TruthFiles;
 use serde::{Deserialize, Serialize};
 
 use crate::session::Outcome;
@@ -103,7 +103,7 @@ impl MapTally {
 }
 
 /// Compare with the disparities that a scene knows at both times of the earlier frame's pixels.
-pub fn scene_maps(rig: &StereoRig, dense: &DenseResults, truth: &TruthMaps) -> Result<Option<MapVerdict>> {
+pub fn scene_maps(rig: &StereoRig, dense: &DenseResults, truth: &TruthFiles) -> Result<Option<MapVerdict>> {
     let (Some(now), Some(next)) = (&truth.disparity, &truth.next_disparity) else { return Ok(None) };
     let (now, next): (Field, Field) = (now.read()?, next.read()?);
     if now.size() != dense.disparity.shift.size() || next.size() != now.size() {

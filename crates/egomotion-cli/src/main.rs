@@ -26,7 +26,7 @@ mod terminal;
 use std::process::ExitCode;
 
 use clap::Parser;
-use egomotion_io::ChoiceError;
+use egomotion_io::OptionsError;
 
 use args::{Cli, Command};
 
@@ -51,10 +51,10 @@ impl std::fmt::Display for Usage {
 impl std::error::Error for Usage {}
 
 /// A choice that has no meaning is one of options.
-pub fn refusal(error: ChoiceError) -> anyhow::Error {
+pub fn refusal(error: OptionsError) -> anyhow::Error {
     match error {
-        ChoiceError::Choice(words) => Usage(words).into(),
-        ChoiceError::File(error) => error.into(),
+        OptionsError::Invalid(words) => Usage(words).into(),
+        OptionsError::File(error) => error.into(),
     }
 }
 

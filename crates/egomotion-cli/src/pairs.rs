@@ -153,7 +153,7 @@ fn matched(args: &RunArgs, config: &Config, pair: &Sequence, out: &Path) -> Resu
     let begun = Instant::now();
     let map = DisparityMatcher::new(config.disparity.clone()).compute(&left, &right)?;
     let disparity_ms = 1e3 * begun.elapsed().as_secs_f64();
-    let truth = pair.truth_maps.as_ref().and_then(|truth| truth.disparity.as_ref());
+    let truth = pair.truth_files.as_ref().and_then(|truth| truth.disparity.as_ref());
     let verdict = truth.map(|truth| truth.read()).transpose()?.and_then(|truth| verdict(&map, &truth));
     let folder = ResultFolder::create(out)?;
     let formats =

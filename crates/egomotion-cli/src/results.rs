@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use egomotion::geometry::StereoRig;
 use egomotion::pipeline::{Config, Observe};
-use egomotion_io::motion_table::{self, Motion, MotionRow};
+use egomotion_io::motion_table::{self, EstimatedMotion, MotionRow};
 use egomotion_io::trajectory::{Pose, write_euroc, write_kitti, write_tum};
 use egomotion_io::write;
 use serde::Serialize;
@@ -175,7 +175,7 @@ pub fn motion_row(row: &Row) -> MotionRow {
         frame: row.index,
         time_s: motion.time_s,
         dt_s: motion.dt_s,
-        motion: motion.motion.as_ref().ok().map(|estimate| Motion {
+        motion: motion.motion.as_ref().ok().map(|estimate| EstimatedMotion {
             phi: estimate.theta,
             observed: estimate.observed,
             rows: estimate.rows,

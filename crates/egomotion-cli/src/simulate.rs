@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 use anyhow::Result;
-use egomotion_io::simulated::{SequenceFolder, World};
+use egomotion_io::simulation::{SequenceFolder, Simulation};
 
 use crate::args::SimulateArgs;
 use crate::run::set_threads;
@@ -15,7 +15,7 @@ use crate::{Ending, refusal, terminal};
 /// Render frame by frame and write.
 pub fn simulate(args: &SimulateArgs) -> Result<Ending> {
     set_threads(args.threads)?;
-    let world = World::of(&args.options()).map_err(refusal)?;
+    let world = Simulation::new(&args.options()).map_err(refusal)?;
     for warning in &world.warnings {
         terminal::tell(warning);
     }

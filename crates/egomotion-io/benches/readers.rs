@@ -8,7 +8,7 @@ use std::path::Path;
 use ::image::{DynamicImage, GrayImage, ImageBuffer, ImageFormat, Luma};
 use criterion::{Criterion, Throughput};
 use egomotion::geometry::{Field, Gaussian, Grid, RigidMotion, Twist};
-use egomotion_io::motion_table::{self, Motion, MotionRow};
+use egomotion_io::motion_table::{self, EstimatedMotion, MotionRow};
 use egomotion_io::trajectory::{self, Pose};
 use egomotion_io::{depth, disparity_png, flo, flow_png, image, npy, pfm, tracks};
 use nalgebra::{Matrix6, Vector6};
@@ -166,7 +166,7 @@ fn row(frame: usize, pose: &RigidMotion) -> MotionRow {
         frame,
         time_s: 0.1 * frame as f64,
         dt_s: Some(0.1),
-        motion: Some(Motion { phi, observed: [true; 6], rows: 16_000, inliers: 14_000 }),
+        motion: Some(EstimatedMotion { phi, observed: [true; 6], rows: 16_000, inliers: 14_000 }),
         impact_s: Some([2.0, 1.8, 2.3]),
         status: "ok".into(),
     }

@@ -53,12 +53,12 @@ impl IoError {
     }
 }
 
-/// Why something that was asked for cannot be done.
+/// Why options cannot be carried out.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-pub enum ChoiceError {
-    /// The choices have no meaning, or do not fit together or to what they are about.
+pub enum OptionsError {
+    /// The options have no meaning, or do not fit together or to what they are about; in words.
     #[error("{0}")]
-    Choice(String),
+    Invalid(String),
     /// A file that is needed cannot be used.
     #[error(transparent)]
     File(#[from] IoError),

@@ -1,5 +1,12 @@
 //! Images, datasets, calibration files, trajectories and maps for `egomotion`.
 //!
+//! | kind | modules |
+//! |---|---|
+//! | recordings | [`source`] (dataset layouts), [`calibration`], [`recording`] (frames for a pipeline), [`stream`] (images end to end) |
+//! | images and maps | [`image`], [`depth`], [`disparity_png`], [`flow_png`], [`pfm`], [`flo`], [`npy`], [`ply`], [`precomputed`] |
+//! | tables | [`motion_table`], [`trajectory`], [`tracks`] |
+//! | whole tasks | [`simulation`] (a rendered sequence as a folder), [`evaluation`] (a trajectory against the truth) |
+//!
 //! Every reader comes twice: `read` takes a path, `decode` (or `parse`) takes what was read, so
 //! that it also serves streams. No reader panics or allocates without bound on any input, and each
 //! error is one line that names the file, the reason and what to do ([`IoError`]).
@@ -20,34 +27,24 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod calibration;
-pub mod depth;
-pub mod disparity_png;
-pub mod error;
+mod error;
 pub mod evaluation;
-pub mod flo;
-pub mod flow_png;
-pub mod given;
 pub mod image;
-#[cfg(feature = "parquet")]
-pub mod motion_parquet;
-pub mod motion_table;
-pub mod npy;
-pub mod npz;
-pub mod pfm;
-pub mod ply;
-mod raster;
+mod maps;
 pub mod read;
 pub mod recording;
-pub mod simulated;
+pub mod simulation;
 pub mod source;
-pub mod stream;
-pub mod tracks;
-pub mod trajectory;
-pub mod undistort;
+mod tables;
 pub mod write;
 
-pub use error::{ChoiceError, IoError};
+pub use error::{IoError, OptionsError};
+pub use image::stream;
+pub use maps::{depth, disparity_png, flo, flow_png, npy, pfm, ply, precomputed};
 pub use source::Source;
+#[cfg(feature = "parquet")]
+pub use tables::motion_parquet;
+pub use tables::{motion_table, tracks, trajectory};
 
 /// The examples of the README, compiled with the doc tests; here because they need both libraries.
 #[cfg(doctest)]

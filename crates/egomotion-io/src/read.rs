@@ -8,35 +8,35 @@ use serde::de::DeserializeOwned;
 
 use crate::IoError;
 
-/// The most pixels that a decoded image or map may have, 2²⁸.
+/// The most pixels that a decoded image or map may have, 2²⁸: a bound on memory, 1 GiB in single precision.
 pub const MAX_PIXELS: usize = 1 << 28;
 
 /// The most pixels that a byte of a file can stand for: deflate, the densest code of the formats read here, makes
 /// at most 1032 bytes of one (<https://zlib.net/zlib_tech.html>), and a pixel has at least one bit.
 const MAX_PIXELS_PER_BYTE: usize = 8 * 1032;
 
-/// The longest text file that is read, in bytes.
-const MAX_TEXT: u64 = 1 << 28;
+/// The longest text file that is read, in bytes (256 MiB): a bound on memory, far above any calibration or trajectory.
+const MAX_TEXT_BYTES: u64 = 1 << 28;
 
 /// The longest binary file that is read, in bytes: a map of [`MAX_PIXELS`] with 8 bytes each, and its head.
-const MAX_BYTES: u64 = (MAX_PIXELS as u64) * 8 + (1 << 20);
+const MAX_BINARY_BYTES: u64 = (MAX_PIXELS as u64) * 8 + (1 << 20);
 
 /// A whole binary file.
 ///
 /// # Errors
 /// The file cannot be read, or is longer than any map can be.
-pub fn bytes(path: &Path) -> Result<Vec<u8>, IoError> {
-    bounded(path, MAX_BYTES)
+pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, IoError> {
+    bounded(path, MAX_BINARY_BYTES)
 }
 
 /// A whole text file.
 ///
 /// # Errors
 /// The file cannot be read, is longer than 256 MB, or is not UTF-8.
-pub fn text(path: &Path) -> Result<String, IoError> {
+pub(crate) fn text(path: &Path) -> Result<String, IoError> {
     let not_text =
         |_| IoError::new(path, "is not a text file", "check that the name belongs to this kind of file");
-    String::from_utf8(bounded(path, MAX_TEXT)?).map_err(not_text)
+    String::from_utf8(bounded(path, MAX_TEXT_BYTES)?).map_err(not_text)
 }
 
 /// The value that a TOML file holds.

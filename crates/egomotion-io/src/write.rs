@@ -8,7 +8,10 @@ use tempfile::{Builder, NamedTempFile};
 
 use crate::IoError;
 
-/// Write a whole file at once, replacing one of the same name; see [`atomically`].
+/// How the names of unfinished files begin, by which [`sweep`] knows them.
+const TEMPORARY_PREFIX: &str = ".egomotion-";
+
+/// Write a whole file at once, replacing one of the same name; it appears complete or not at all.
 ///
 /// # Errors
 /// Names the file: its folder is missing or not writable, the disk is full, a folder has its name.
@@ -23,7 +26,7 @@ pub fn bytes(path: &Path, content: &[u8]) -> Result<(), IoError> {
 ///
 /// # Errors
 /// Names the file: its folder is missing or not writable, the disk is full, a folder has its name.
-pub fn atomically(
+pub(crate) fn atomically(
     path: &Path,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), IoError> {
@@ -50,7 +53,9 @@ pub fn sweep(path: &Path) -> Result<(), IoError> {
         };
         for entry in entries {
             let entry = entry?;
-            if entry.file_name().to_string_lossy().starts_with(TEMPORARY) && entry.file_type()?.is_file() {
+            if entry.file_name().to_string_lossy().starts_with(TEMPORARY_PREFIX)
+                && entry.file_type()?.is_file()
+            {
                 fs::remove_file(entry.path())?;
             }
         }
@@ -67,13 +72,10 @@ pub fn folder(path: &Path) -> Result<(), IoError> {
     fs::create_dir_all(path).map_err(|error| IoError::system(path, "make the folder", &error))
 }
 
-/// How the names of unfinished files begin.
-const TEMPORARY: &str = ".egomotion-";
-
 fn temporary_beside(path: &Path) -> io::Result<NamedTempFile> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut builder = Builder::new();
-    builder.prefix(TEMPORARY);
+    builder.prefix(TEMPORARY_PREFIX);
     // A temporary file is private by default; a result is as readable as any file of this user.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use egomotion::geometry::RigidMotion;
 use egomotion::metrics::{relative_pose_error, travelled_m};
-use egomotion_io::source::{Clock, Layout};
+use egomotion_io::source::{Clock, DatasetLayout};
 use egomotion_io::{IoError, Source, flo, flow_png, image};
 
 /// A folder of the real data; `None`, and a line that says so, where it is missing.
@@ -30,7 +30,7 @@ fn near(value: f64, expected: f64, within: f64) {
 fn kitti_odometry_06() -> Result<(), IoError> {
     let Some(folder) = data("kitti_odometry/sequences/06") else { return Ok(()) };
     let source = Source::open(&folder)?;
-    assert_eq!((source.layout, source.sequences.len()), (Layout::KittiOdometry, 1));
+    assert_eq!((source.layout, source.sequences.len()), (DatasetLayout::KittiOdometry, 1));
     let sequence = &source.sequences[0];
     assert_eq!((sequence.name.as_str(), sequence.frames.len(), sequence.clock), ("06", 51, Clock::Measured));
     let rig = sequence.rig.unwrap();
@@ -55,7 +55,7 @@ fn karlsruhe_and_rectified_euroc_in_kittis_folders() -> Result<(), IoError> {
     if let Some(folder) = data("karlsruhe_0019") {
         let source = Source::open(&folder)?;
         let sequence = &source.sequences[0];
-        assert_eq!((source.layout, sequence.frames.len()), (Layout::Karlsruhe, 45));
+        assert_eq!((source.layout, sequence.frames.len()), (DatasetLayout::Karlsruhe, 45));
         near(sequence.rig.unwrap().focal_px, 645.24, 0.005);
         near(sequence.rig.unwrap().baseline_m, 0.5707, 5e-5);
         // It drives forwards: along Z of the camera, about a metre a frame, hardly sideways.
@@ -82,7 +82,10 @@ fn euroc_mh01_raw() -> Result<(), IoError> {
     let source = Source::open(&folder)?;
     assert_eq!(Source::open(&folder.join("mav0"))?.sequences, source.sequences);
     let sequence = &source.sequences[0];
-    assert_eq!((source.layout, sequence.frames.len(), sequence.clock), (Layout::Euroc, 60, Clock::Measured));
+    assert_eq!(
+        (source.layout, sequence.frames.len(), sequence.clock),
+        (DatasetLayout::Euroc, 60, Clock::Measured)
+    );
     let pair = sequence.rectification.as_ref().unwrap();
     assert_eq!(pair.left().focal_px(), (458.654, 457.296));
     let rig = sequence.rig.unwrap();
@@ -102,7 +105,7 @@ fn euroc_mh01_raw() -> Result<(), IoError> {
 fn kitti_scene_flow_2015() -> Result<(), IoError> {
     let Some(folder) = data("kitti_scene_flow_2015") else { return Ok(()) };
     let source = Source::open(&folder)?;
-    assert_eq!(source.layout, Layout::KittiSceneFlow2015);
+    assert_eq!(source.layout, DatasetLayout::KittiSceneFlow2015);
     assert_eq!(Source::open(&folder.join("training"))?.sequences, source.sequences);
     let names: Vec<_> = source.sequences.iter().map(|s| s.name.as_str()).collect();
     assert_eq!(names, ["000002", "000003"]);
@@ -113,7 +116,7 @@ fn kitti_scene_flow_2015() -> Result<(), IoError> {
         let rig = sequence.rig.unwrap();
         near(rig.focal_px, 721.54, 0.005);
         near(rig.baseline_m, 0.5327, 5e-5);
-        let truth = sequence.truth_maps.as_ref().unwrap();
+        let truth = sequence.truth_files.as_ref().unwrap();
         assert_eq!(truth.index, 10);
         let before = truth.disparity.as_ref().unwrap().read()?;
         let after = truth.next_disparity.as_ref().unwrap().read()?;
@@ -138,7 +141,7 @@ fn kitti_scene_flow_2015() -> Result<(), IoError> {
 fn kitti_stereo_flow_2012() -> Result<(), IoError> {
     let Some(folder) = data("kitti_stereo_flow_2012") else { return Ok(()) };
     let source = Source::open(&folder)?;
-    assert_eq!(source.layout, Layout::KittiStereoFlow2012);
+    assert_eq!(source.layout, DatasetLayout::KittiStereoFlow2012);
     let [first, second] = &source.sequences[..] else { panic!("{:?}", source.sequences) };
     assert_eq!((first.name.as_str(), second.name.as_str()), ("000027", "000138"));
     let indices =
@@ -149,7 +152,7 @@ fn kitti_stereo_flow_2012() -> Result<(), IoError> {
     near(first.rig.unwrap().baseline_m, 0.537166, 1e-6);
     near(second.rig.unwrap().baseline_m, 0.537151, 1e-6);
     assert_eq!((first.rig.unwrap().width_px, first.rig.unwrap().height_px), (1241, 376));
-    let truth = first.truth_maps.as_ref().unwrap();
+    let truth = first.truth_files.as_ref().unwrap();
     assert!(truth.next_disparity.is_none());
     assert!(truth.disparity.as_ref().unwrap().read()?.count() > 10_000);
     assert!(flow_png::read(truth.flow.as_ref().unwrap())?[0].count() > 10_000);

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use egomotion::geometry::Grid;
-use egomotion_io::source::{Clock, Layout};
+use egomotion_io::source::{Clock, DatasetLayout};
 use egomotion_io::{Source, image};
 use nalgebra::Vector3;
 use tempfile::TempDir;
@@ -38,7 +38,7 @@ fn refused(folder: &Path) -> String {
 fn without_times_they_are_assumed_and_it_says_so() {
     let folder = sequence(0, 1, 3);
     let source = Source::open(folder.path()).unwrap();
-    assert_eq!(source.layout, Layout::KittiOdometry);
+    assert_eq!(source.layout, DatasetLayout::KittiOdometry);
     assert!(source.reason.contains("image_0 and image_1"));
     let sequence = &source.sequences[0];
     assert_eq!(sequence.clock, Clock::Assumed { interval_s: 0.1 });
@@ -178,12 +178,12 @@ fn scenes_are_independent_sequences() {
         fs::write(training.join(format!("calib/{scene}.txt")), CALIBRATION).unwrap();
     }
     let source = Source::open(root.path()).unwrap();
-    assert!(source.layout == Layout::KittiStereoFlow2012 && source.layout.is_scene_set());
+    assert!(source.layout == DatasetLayout::KittiStereoFlow2012 && source.layout.is_scene_set());
     assert!(source.reason.contains("training/image_0"), "{}", source.reason);
     let [first, second] = &source.sequences[..] else { panic!("{:?}", source.sequences) };
     assert_eq!((first.name.as_str(), second.name.as_str()), ("000004", "000011"));
-    assert_eq!(first.truth_maps, None);
-    assert!(second.truth_maps.as_ref().unwrap().flow.is_some());
+    assert_eq!(first.truth_files, None);
+    assert!(second.truth_files.as_ref().unwrap().flow.is_some());
     assert!(second.frames[1].right.is_none() && second.frames[1].time_s == 0.1);
 }
 
@@ -226,7 +226,7 @@ fn raw_drive() -> TempDir {
 fn a_raw_drive_has_time_stamps_and_the_poses_of_its_inertial_system() {
     let day = raw_drive();
     let source = Source::open(&day.path().join("drive_0001_sync")).unwrap();
-    assert_eq!(source.layout, Layout::KittiRaw);
+    assert_eq!(source.layout, DatasetLayout::KittiRaw);
     let sequence = &source.sequences[0];
     assert_eq!((sequence.name.as_str(), sequence.clock), ("drive_0001_sync", Clock::Measured));
     assert_eq!(sequence.rig.unwrap().baseline_m, 0.5);

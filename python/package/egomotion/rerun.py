@@ -44,9 +44,9 @@ def log(
     world_from_camera, rotation (3, 3) and translation (3,); by default the answer's own, which that of a recording has. What is
     not known is cleared, lest the viewer go on to show an earlier frame's.
     """
-    rr.set_time("time", duration=answer.time, recording=recording)
+    rr.set_time("time", duration=answer.time_s, recording=recording)
     rr.set_time("frame", sequence=answer.frame, recording=recording)
-    if answer.dt is None:
+    if answer.dt_s is None:
         for path, names in _SERIES.items():
             rr.log(f"{entity}/{path}", rr.SeriesLines(names=names), static=True, recording=recording)
     if answer.reason is not None:
@@ -66,9 +66,9 @@ def _camera(answer: FrameMotion, rig: StereoRig, pose: tuple[npt.ArrayLike, npt.
     yield "camera", None if pose is None else _transform(pose)
     yield "camera/before", _transform(exp(answer.phi)) if np.isfinite(answer.phi).all() else None
     pinhole = rr.Pinhole(
-        focal_length=[rig.focal, rig.focal_y],
-        principal_point=rig.centre,
-        resolution=rig.size,
+        focal_length=[rig.focal_px, rig.focal_y_px],
+        principal_point=rig.centre_px,
+        resolution=rig.size_px,
         camera_xyz=rr.ViewCoordinates.RDF,
     )
     yield "camera/before/image", pinhole
@@ -88,7 +88,7 @@ def _maps(answer: FrameMotion, rig: StereoRig, left: npt.ArrayLike | None) -> _S
     for name in ("disparity", "depth_velocity", "depth_velocity_sigma", "looming"):
         values = getattr(answer, name)
         yield name, None if values is None else rr.Image(values, color_model="L")
-    groups = answer.moving
+    groups = answer.moving_groups
     boxes = rr.Boxes2D(
         array=[group.bounds for group in groups],
         array_format=rr.Box2DFormat.XYWH,
@@ -107,4 +107,4 @@ def _series(answer: FrameMotion) -> _Shown:
     if impact is None or seconds is None:
         yield "impact", None
     else:
-        yield "impact", rr.Scalars([seconds, *(impact.interval95 or (np.nan, np.nan))])
+        yield "impact", rr.Scalars([seconds, *(impact.interval95_s or (np.nan, np.nan))])

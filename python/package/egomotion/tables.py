@@ -37,9 +37,9 @@ COLUMNS: tuple[str, ...] = (
 def row(answer: FrameMotion) -> dict[str, float | int | str | None]:
     """The row of `motion.csv` of one frame: None where a value is not known."""
     motion, impact = answer.motion, answer.impact
-    interval = impact.interval95 if impact else None
+    interval = impact.interval95_s if impact else None
     values: dict[str, float | int | str | None] = dict.fromkeys(COLUMNS)
-    values.update(frame=answer.frame, time_s=answer.time, dt_s=answer.dt, status=answer.status)
+    values.update(frame=answer.frame, time_s=answer.time_s, dt_s=answer.dt_s, status=answer.status)
     if motion is not None:
         theta, covariance, observed = motion.theta, motion.covariance, motion.observed
         values.update({name: float(theta[i]) if observed[i] else None for i, name in enumerate(_PHI)})
@@ -55,7 +55,7 @@ def row(answer: FrameMotion) -> dict[str, float | int | str | None]:
 
 def columns(answers: Iterable[FrameMotion]) -> dict[str, list[float | int | str | None]]:
     """All rows, column by column; as in `motion.csv` a first answer that has nothing before it has no row."""
-    rows = [row(answer) for k, answer in enumerate(answers) if k > 0 or answer.dt is not None]
+    rows = [row(answer) for k, answer in enumerate(answers) if k > 0 or answer.dt_s is not None]
     return {name: [values[name] for values in rows] for name in COLUMNS}
 
 
@@ -88,4 +88,4 @@ def to_evo(run: Run) -> PoseTrajectory3D:
     """The trajectory of the frames so far for evo: world_from_camera, the first pose the identity."""
     from evo.core.trajectory import PoseTrajectory3D
 
-    return PoseTrajectory3D(poses_se3=list(run.poses), timestamps=np.asarray(run.times))
+    return PoseTrajectory3D(poses_se3=list(run.poses), timestamps=np.asarray(run.times_s))

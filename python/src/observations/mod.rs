@@ -110,32 +110,38 @@ fn equations<T: Sync>(
     Rows::of_six(rows)
 }
 
-/// The exact change of depth (n,) by (6): Z (n,) in metres at t, the disparity map (H, W) after, places (u, v) (n, 2) in
+/// The exact change of depth (n,) by (6): depths Z (n,) in metres at t, the disparity map (H, W) after, places (u, v) (n, 2) in
 /// px where the points have moved to; NaN where the map has no value. Disparity is interpolated, not Z.
 #[pyfunction]
-pub fn exact_change<'py>(
+pub fn exact_depth_change<'py>(
     py: Python<'py>,
-    z: &Bound<'py, PyAny>,
-    after: &Bound<'py, PyAny>,
+    depth: &Bound<'py, PyAny>,
+    disparity_after: &Bound<'py, PyAny>,
     uv: &Bound<'py, PyAny>,
     rig: &Rig,
 ) -> PyResult<Numbers<'py>> {
-    let (z, after, uv) =
-        (arrays::vector("z", z)?, arrays::field("after", after)?, arrays::rows::<2>("uv", uv)?);
+    let (z, after, uv) = (
+        arrays::vector("depth", depth)?,
+        arrays::field("disparity_after", disparity_after)?,
+        arrays::rows::<2>("uv", uv)?,
+    );
     arrays::same_length("uv", uv.len(), z.len())?;
     let change =
         z.iter().zip(&uv).map(|(&z, uv)| vz::exact_change(z, &after, uv.x, uv.y, &rig.0).unwrap_or(f64::NAN));
     Ok(PyArray1::from_iter(py, change))
 }
 
-/// The smallest change of depth (n,) in metres that a disparity step shows at disparities d (n,), (51).
+/// The smallest change of depth (n,) in metres that a step of disparity in pixels shows at disparities (n,) in pixels, (51).
 #[pyfunction]
-pub fn smallest_change<'py>(
+pub fn smallest_depth_change<'py>(
     py: Python<'py>,
-    d: &Bound<'py, PyAny>,
-    step: f64,
+    disparity: &Bound<'py, PyAny>,
+    step_px: f64,
     rig: &Rig,
 ) -> PyResult<Numbers<'py>> {
     let bf = rig.0.depth_disparity_product();
-    Ok(PyArray1::from_iter(py, arrays::vector("d", d)?.into_iter().map(|d| vz::smallest_change(d, step, bf))))
+    Ok(PyArray1::from_iter(
+        py,
+        arrays::vector("disparity", disparity)?.into_iter().map(|d| vz::smallest_change(d, step_px, bf)),
+    ))
 }

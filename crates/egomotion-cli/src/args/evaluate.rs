@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use egomotion::metrics::{Delta, TrajectoryAlignment};
-use egomotion_io::evaluation::Options;
-use egomotion_io::trajectory::Format;
+use egomotion_io::evaluation::EvaluationOptions;
+use egomotion_io::trajectory::TrajectoryFormat;
 
 #[derive(Debug, Args)]
 pub struct EvaluateArgs {
@@ -41,9 +41,9 @@ pub struct EvaluateArgs {
 
 impl EvaluateArgs {
     /// How the trajectories are to be compared.
-    pub fn options(&self) -> Options {
-        let own = Options::default();
-        Options {
+    pub fn options(&self) -> EvaluationOptions {
+        let own = EvaluationOptions::default();
+        EvaluationOptions {
             format: self.format.map(Into::into),
             by_time: self.associate == AssociateArg::Time,
             largest_gap_s: self.max_diff,
@@ -113,7 +113,7 @@ pub enum FormatArg {
     Euroc,
 }
 
-impl From<FormatArg> for Format {
+impl From<FormatArg> for TrajectoryFormat {
     fn from(format: FormatArg) -> Self {
         match format {
             FormatArg::Tum => Self::Tum,

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::study::StudyCommand;
-use egomotion_io::simulated::{self, check_size};
+use egomotion_io::simulation::{SimulationOptions, check_size};
 
 pub use evaluate::EvaluateArgs;
 pub use run::{ApproachArg, CloudArg, EstimatorArg, MapFormat, MethodArg, ObserveArg, RunArgs};
@@ -123,8 +123,8 @@ pub struct SimulateArgs {
 
 impl SimulateArgs {
     /// What is asked for.
-    pub fn options(&self) -> simulated::Options {
-        simulated::Options {
+    pub fn options(&self) -> SimulationOptions {
+        SimulationOptions {
             sequence: self.sequence.clone(),
             step: self.step,
             frames: self.frames.map(|frames| frames as usize),

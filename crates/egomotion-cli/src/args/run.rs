@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
-use egomotion_io::recording::{Choice, Sensor};
+use egomotion_io::recording::{RecordingOptions, Sensor};
 use serde::{Serialize, Serializer};
 
 use super::positive;
@@ -121,8 +121,8 @@ pub struct RunArgs {
 
 impl RunArgs {
     /// What is taken of the recording.
-    pub fn choice(&self) -> Choice {
-        Choice {
+    pub fn recording_options(&self) -> RecordingOptions {
+        RecordingOptions {
             start: self.start,
             frames: self.frames,
             stride: Some(self.stride),

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use egomotion::pipeline::{Config, Observe};
 use egomotion_io::read;
-use egomotion_io::source::{Layout, Source};
+use egomotion_io::source::{DatasetLayout, Source};
 
 use crate::args::RunArgs;
 use crate::session::stop_signal;
@@ -37,7 +37,7 @@ pub fn run(args: &RunArgs) -> Result<Ending> {
     }
     let source = Source::open_with(&args.source, args.calibration.as_deref())?;
     let stop = stop_signal("frame");
-    if source.layout == Layout::StereoPairs {
+    if source.layout == DatasetLayout::StereoPairs {
         return pairs::run(args, &config, &source, &out, &stop);
     }
     if source.layout.is_scene_set() {

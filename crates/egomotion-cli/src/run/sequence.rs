@@ -33,7 +33,7 @@ pub fn run_sequence(
     stop: &AtomicBool,
     alone: bool,
 ) -> Result<Option<DoneSequence>> {
-    let recording = Recording::open(&args.source, sequence, &args.choice()).map_err(refusal)?;
+    let recording = Recording::open(&args.source, sequence, &args.recording_options()).map_err(refusal)?;
     let (rig, frames) = (recording.rig, recording.len());
     let config = &suited(args, config, &recording)?;
     let folder = ResultFolder::create(out)?;
@@ -66,10 +66,10 @@ pub fn run_sequence(
     let outcome = session.run(
         log,
         stop,
-        |k| recording.fetch(k),
+        |k| recording.read_frame(k),
         |row| {
             let (Some(dense), Some(index)) = (&row.motion.dense, row.reference_index) else { return Ok(()) };
-            if let Some(truth) = sequence.truth_maps.as_ref().filter(|t| t.index == index && !args.reverse) {
+            if let Some(truth) = sequence.truth_files.as_ref().filter(|t| t.index == index && !args.reverse) {
                 truth_maps = judge::scene_maps(&rig, dense, truth)?;
             }
             maps.write(out, index, dense, &rig)

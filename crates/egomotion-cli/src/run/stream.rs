@@ -10,8 +10,8 @@ use egomotion::observe::{RectificationMap, Rectifier};
 use egomotion::pipeline::{Config, Frame, StereoFrame, Unanswered};
 use egomotion_io::IoError;
 use egomotion_io::calibration::{self, CameraPair};
-use egomotion_io::recording::{Fetched, Given, halves, unseen};
-use egomotion_io::stream::{ImageStream, Kind};
+use egomotion_io::recording::{FrameInput, SourceFrame, halves, unseen};
+use egomotion_io::stream::{ImageStream, StreamFormat};
 use serde_json::{Value, json};
 
 use crate::args::RunArgs;
@@ -34,7 +34,7 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
     let Some(file) = &args.calibration else {
         return Err(Usage("frames on standard input need --calibration FILE".into()).into());
     };
-    let kind = args.raw.map_or(Kind::Png, |(width, height)| Kind::Raw { width, height });
+    let kind = args.raw.map_or(StreamFormat::Png, |(width, height)| StreamFormat::Raw { width, height });
     let images = ImageStream::new(std::io::stdin(), kind, Path::new(NAME.0));
     let mut pairs = Pairs { images, side_by_side: args.side_by_side };
     let Some(first) = pairs.next()? else {
@@ -67,10 +67,10 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
                 Ok(StereoFrame { time_s, left, right }.into())
             },
         );
-        Some(Fetched {
+        Some(SourceFrame {
             index: k,
             time_s,
-            frame: frame.map(|frame| Given::Frame(Box::new(frame))),
+            input: frame.map(|frame| FrameInput::Images(Box::new(frame))),
             truth: None,
             decode_ms: 0.0,
             bytes: 0,

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Result;
 use egomotion::geometry::{Grid, RigidMotion, StereoRig, Twist};
 use egomotion::pipeline::{Config, FrameMotion, Trajectory, Unanswered};
-use egomotion_io::recording::{Fetched, with_frames};
+use egomotion_io::recording::{SourceFrame, with_frames};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +95,7 @@ impl Session<'_> {
         &self,
         log: Option<Log>,
         stop: &AtomicBool,
-        fetch: impl Fn(usize) -> Option<Fetched> + Sync,
+        fetch: impl Fn(usize) -> Option<SourceFrame> + Sync,
         mut look: impl FnMut(&Row) -> Result<()>,
     ) -> Result<Outcome> {
         let mut work = Work::new(self)?;

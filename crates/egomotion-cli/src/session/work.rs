@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::{Result, anyhow};
 use egomotion::geometry::{Image, RigidMotion, Twist};
 use egomotion::pipeline::{FrameMotion, Observe, Trajectory};
-use egomotion_io::recording::{Fetched, Given, Pipeline};
+use egomotion_io::recording::{FrameInput, Pipeline, SourceFrame};
 
 use super::log::{DoneFrame, Log, Picture};
 use super::tally::Tally;
@@ -57,7 +57,7 @@ impl<'a> Work<'a> {
     }
 
     /// Take over what a log holds, and add to it from here on.
-    pub fn recall(&mut self, mut log: Log, fetch: &impl Fn(usize) -> Option<Fetched>) -> Result<()> {
+    pub fn recall(&mut self, mut log: Log, fetch: &impl Fn(usize) -> Option<SourceFrame>) -> Result<()> {
         let past = log.take_past();
         if let Some(last) = past.last() {
             (self.earlier_ms, self.tally.aside_ms) = (last.wall_ms, last.aside_ms);
@@ -80,10 +80,10 @@ impl<'a> Work<'a> {
         Ok(())
     }
 
-    pub fn frame(&mut self, fetched: Fetched, look: &mut impl FnMut(&Row) -> Result<()>) -> Result<()> {
-        let Fetched { index, time_s, frame, truth, decode_ms, bytes } = fetched;
+    pub fn frame(&mut self, fetched: SourceFrame, look: &mut impl FnMut(&Row) -> Result<()>) -> Result<()> {
+        let SourceFrame { index, time_s, input: frame, truth, decode_ms, bytes } = fetched;
         let left = match &frame {
-            Ok(Given::Frame(frame)) => Some(frame.left.clone()),
+            Ok(FrameInput::Images(frame)) => Some(frame.left.clone()),
             _ => None,
         };
         let motion = self.pipeline.push(time_s, frame);

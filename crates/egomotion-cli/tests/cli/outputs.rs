@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use assert_cmd::cargo::cargo_bin_cmd;
 use egomotion::geometry::Twist;
-use egomotion_io::trajectory::{Format, Pose, read};
+use egomotion_io::trajectory::{Pose, TrajectoryFormat, read};
 use tempfile::TempDir;
 
 use crate::process::{Ended, names, run, summary};
@@ -32,8 +32,8 @@ pub fn phi(row: &Row) -> Twist {
 
 /// The trajectory of a folder of results; both files must say the same.
 pub fn trajectory(out: &Path) -> Vec<Pose> {
-    let tum = read(&out.join("trajectory_tum.txt"), Some(Format::Tum)).unwrap();
-    let kitti = read(&out.join("trajectory_kitti.txt"), Some(Format::Kitti)).unwrap();
+    let tum = read(&out.join("trajectory_tum.txt"), Some(TrajectoryFormat::Tum)).unwrap();
+    let kitti = read(&out.join("trajectory_kitti.txt"), Some(TrajectoryFormat::Kitti)).unwrap();
     assert_eq!(tum.len(), kitti.len());
     for (a, b) in tum.iter().zip(&kitti) {
         let (a, b) = (a.world_from_camera, b.world_from_camera);

@@ -5,6 +5,9 @@ use egomotion::geometry::{Camera, Distortion, RigidMotion, StereoRectification};
 use super::document::Entry;
 use crate::IoError;
 
+/// Longest baseline that is taken for metres: a longer one is a calibration in millimetres.
+const LARGEST_BASELINE_M: f64 = 20.0;
+
 /// One camera as a file describes it: the image size is often not in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraModel {
@@ -30,9 +33,6 @@ pub struct RawPair {
     /// Pose of the left camera in the frame of the body that carries it (EuRoC's T_BS), where the file has it.
     pub body_from_left: Option<RigidMotion>,
 }
-
-/// A greater distance between two cameras must be in other units than metres.
-const LARGEST_BASELINE_M: f64 = 20.0;
 
 impl RawPair {
     /// The rectification of the pair for images of `size`, which the file's own size must be, if it has one.
@@ -130,22 +130,23 @@ pub(super) fn coefficients(distortion: &Distortion) -> Vec<f64> {
 /// Width and height as whole numbers.
 pub(super) fn size(entry: &Entry<'_>) -> Result<(usize, usize), IoError> {
     let [width, height] = entry.numbers()?;
-    whole(width, height).ok_or_else(|| entry.refuse("is no image size", "give width and height in pixels"))
+    whole_size(width, height)
+        .ok_or_else(|| entry.refuse("is no image size", "give width and height in pixels"))
 }
 
 /// Width and height, if they are whole, positive and not beyond any image.
-pub(super) fn whole(width: f64, height: f64) -> Option<(usize, usize)> {
+pub(super) fn whole_size(width: f64, height: f64) -> Option<(usize, usize)> {
     let side = |n: f64| ((1.0..1e6).contains(&n) && n.fract() == 0.0).then_some(n as usize);
     Some((side(width)?, side(height)?))
 }
 
 /// Numbers with commas between, written so that they read back the same.
-pub(super) fn list(numbers: &[f64]) -> String {
+pub(super) fn comma_separated(numbers: &[f64]) -> String {
     numbers.iter().map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ")
 }
 
 /// The 16 numbers of a rigid motion.
-pub(super) fn sixteen(motion: &RigidMotion) -> [f64; 16] {
+pub(super) fn row_major_4x4(motion: &RigidMotion) -> [f64; 16] {
     let (r, t) = (&motion.rotation, &motion.translation);
     let mut m = [0.0; 16];
     for i in 0..3 {

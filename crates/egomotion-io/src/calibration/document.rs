@@ -38,8 +38,8 @@ pub(super) struct Entry<'a> {
     node: &'a Node,
 }
 
-/// Lists, maps and elements may be nested so deep.
-const DEEPEST: usize = 32;
+/// How deep lists, maps and elements may be nested: a bound on the stack; calibrations need four or five levels.
+const MAX_NESTING: usize = 32;
 
 impl Document {
     /// A YAML text. OpenCV's head `%YAML:1.0`, which no YAML parser takes, is skipped.
@@ -47,7 +47,7 @@ impl Document {
         let bare = text.strip_prefix("%YAML:").map(|rest| format!("# {rest}"));
         let options = serde_saphyr::options! {
             with_snippet: false,
-            budget: serde_saphyr::budget! { max_depth: DEEPEST },
+            budget: serde_saphyr::budget! { max_depth: MAX_NESTING },
         };
         let tree =
             serde_saphyr::from_str_with_options::<Spanned<Value>>(bare.as_deref().unwrap_or(text), options);
@@ -86,7 +86,7 @@ impl Document {
             let event = reader.read_event().map_err(|e| refuse(e.to_string(), reader.error_position()))?;
             let here = reader.buffer_position();
             match event {
-                Event::Start(tag) if open.len() > DEEPEST => {
+                Event::Start(tag) if open.len() > MAX_NESTING => {
                     return Err(refuse(format!("{:?} is nested too deep", tag.name()), here));
                 }
                 Event::Start(tag) => {

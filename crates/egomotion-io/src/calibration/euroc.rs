@@ -4,7 +4,7 @@ use std::path::Path;
 
 use egomotion::geometry::{Distortion, RigidMotion};
 
-use super::camera::{CameraModel, RawPair, coefficients, distortion, list, sixteen, size};
+use super::camera::{CameraModel, RawPair, coefficients, comma_separated, distortion, row_major_4x4, size};
 use super::document::{Document, Entry};
 use crate::{IoError, read, write};
 
@@ -12,7 +12,7 @@ use crate::{IoError, read, write};
 ///
 /// # Errors
 /// The file cannot be read, or names the line and key that is missing or wrong.
-pub fn read(path: &Path) -> Result<(CameraModel, RigidMotion), IoError> {
+pub(crate) fn read(path: &Path) -> Result<(CameraModel, RigidMotion), IoError> {
     parse(&read::text(path)?, path)
 }
 
@@ -28,7 +28,7 @@ pub fn parse(text: &str, path: &Path) -> Result<(CameraModel, RigidMotion), IoEr
 ///
 /// # Errors
 /// As [`read()`].
-pub fn read_pair(left: &Path, right: &Path) -> Result<RawPair, IoError> {
+pub(crate) fn read_pair(left: &Path, right: &Path) -> Result<RawPair, IoError> {
     let ((left, body_from_left), (right, body_from_right)) = (read(left)?, read(right)?);
     let right_from_left = body_from_right.inverse().after(&body_from_left);
     Ok(RawPair { left, right, right_from_left, body_from_left: Some(body_from_left) })
@@ -71,9 +71,9 @@ pub fn write(path: &Path, camera: &CameraModel, body_from_camera: &RigidMotion) 
     let text = format!(
         "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n{size}camera_model: pinhole\n\
          intrinsics: [{}]\ndistortion_model: {model}\ndistortion_coefficients: [{}]\n",
-        list(&sixteen(body_from_camera)),
-        list(&[fx, fy, cx, cy]),
-        list(&coefficients(&camera.distortion)),
+        comma_separated(&row_major_4x4(body_from_camera)),
+        comma_separated(&[fx, fy, cx, cy]),
+        comma_separated(&coefficients(&camera.distortion)),
     );
     write::bytes(path, text.as_bytes())
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use egomotion::geometry::Distortion;
 
-use super::camera::{CameraModel, RawPair, coefficients, distortion, list, sixteen, size};
+use super::camera::{CameraModel, RawPair, coefficients, comma_separated, distortion, row_major_4x4, size};
 use super::document::{Document, Entry};
 use crate::{IoError, read, write};
 
@@ -12,7 +12,7 @@ use crate::{IoError, read, write};
 ///
 /// # Errors
 /// The file cannot be read, or names the line and key that is missing or wrong.
-pub fn read(path: &Path) -> Result<RawPair, IoError> {
+pub(crate) fn read(path: &Path) -> Result<RawPair, IoError> {
     parse(&read::text(path)?, path)
 }
 
@@ -56,8 +56,8 @@ fn camera(cam: &Entry<'_>) -> Result<CameraModel, IoError> {
 /// The file cannot be written, or the format has no name for the distortion.
 pub fn write(path: &Path, pair: &RawPair) -> Result<(), IoError> {
     let rows = |motion: &egomotion::geometry::RigidMotion| {
-        let rows = sixteen(motion);
-        rows.chunks(4).map(|row| format!("  - [{}]\n", list(row))).collect::<String>()
+        let rows = row_major_4x4(motion);
+        rows.chunks(4).map(|row| format!("  - [{}]\n", comma_separated(row))).collect::<String>()
     };
     let mut text = String::new();
     for (name, camera) in [("cam0", &pair.left), ("cam1", &pair.right)] {
@@ -81,8 +81,8 @@ pub fn write(path: &Path, pair: &RawPair) -> Result<(), IoError> {
         }
         text += &format!(
             "  camera_model: pinhole\n  intrinsics: [{}]\n  distortion_model: {model}\n  distortion_coeffs: [{}]\n",
-            list(&[fx, fy, cx, cy]),
-            list(&lens)
+            comma_separated(&[fx, fy, cx, cy]),
+            comma_separated(&lens)
         );
         if let Some((w, h)) = camera.size {
             text += &format!("  resolution: [{w}, {h}]\n");

@@ -10,11 +10,11 @@ use nalgebra::Vector3;
 
 use crate::{IoError, read, write};
 
-/// Write the grey pair of a rig as P0 and P1, such that [`Calibration::rig`] gives the rig back.
+/// Write the grey pair of a rig as P0 and P1, such that [`KittiCalibration::rig`] gives the rig back.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write(path: &Path, rig: &StereoRig) -> Result<(), IoError> {
+pub(crate) fn write_grey_pair(path: &Path, rig: &StereoRig) -> Result<(), IoError> {
     let row = |cx: f64, last: f64| {
         let (fx, fy, cy) = (rig.focal_px, rig.focal_y_px, rig.cy_px);
         // Written so that the numbers read back the same.
@@ -43,13 +43,13 @@ struct Projection {
 
 /// The projection matrices of a calibration file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Calibration {
+pub struct KittiCalibration {
     path: PathBuf,
     projections: Vec<Projection>,
 }
 
-impl Calibration {
-    /// The projection matrices of a file; see [`Calibration::parse`].
+impl KittiCalibration {
+    /// The projection matrices of a file; see [`KittiCalibration::parse`].
     ///
     /// # Errors
     /// The file cannot be read, or a matrix in it is not 12 finite numbers.
@@ -147,7 +147,7 @@ impl Calibration {
 
 impl CameraPair {
     /// Numbers of the left and the right camera.
-    pub fn cameras(self) -> [usize; 2] {
+    pub(crate) fn cameras(self) -> [usize; 2] {
         match self {
             Self::Grey => [0, 1],
             Self::Colour => [2, 3],
@@ -175,7 +175,7 @@ mod tests {
     const RIGHT: &str = "700 0 603 -350 0 700 180 0 0 0 1 0";
 
     fn rig(text: &str) -> Result<StereoRig, String> {
-        let calibration = Calibration::parse(text, Path::new("calib.txt")).map_err(|e| e.to_string())?;
+        let calibration = KittiCalibration::parse(text, Path::new("calib.txt")).map_err(|e| e.to_string())?;
         calibration.rig(CameraPair::Grey, SIZE).map_err(|e| e.to_string())
     }
 
@@ -183,7 +183,7 @@ mod tests {
     fn baseline_is_the_difference_of_the_fourth_entries() {
         let text = "calib_time: 09-Jan-2012 13:57:47\nS_rect_02: 1 2\nP_rect_02: 700 0 600 35 0 700 180 7 0 0 1 0.01\n\
                     P_rect_03: 700 0 600 -315 0 700 180 0 0 0 1 0\n";
-        let calibration = Calibration::parse(text, Path::new("c.txt")).unwrap();
+        let calibration = KittiCalibration::parse(text, Path::new("c.txt")).unwrap();
         let rig = calibration.rig(CameraPair::Colour, SIZE).unwrap();
         assert!((rig.baseline_m - 0.5).abs() < 1e-12);
         // K c + p₄ = 0: the camera's centre projects to nothing.
@@ -213,13 +213,13 @@ mod tests {
             width_px: 320,
             height_px: 240,
         };
-        write(&path, &given).unwrap();
-        let back = Calibration::read(&path).unwrap().rig(CameraPair::Grey, (320, 240)).unwrap();
+        write_grey_pair(&path, &given).unwrap();
+        let back = KittiCalibration::read(&path).unwrap().rig(CameraPair::Grey, (320, 240)).unwrap();
         let numbers = |r: &StereoRig| [r.focal_px, r.focal_y_px, r.cx_px, r.cy_px, r.doffs_px, r.baseline_m];
         for (a, b) in numbers(&given).into_iter().zip(numbers(&back)) {
             assert!((a - b).abs() <= 1e-12, "{given:?} {back:?}");
         }
-        assert!(write(&folder.path().join("none").join("calib.txt"), &given).is_err());
+        assert!(write_grey_pair(&folder.path().join("none").join("calib.txt"), &given).is_err());
     }
 
     #[test]

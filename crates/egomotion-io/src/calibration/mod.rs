@@ -1,10 +1,10 @@
 //! Calibration files of stereo pairs, one module a format; [`read()`] recognises which.
 
-pub mod camera;
+mod camera;
 mod document;
 pub mod euroc;
 pub mod kalibr;
-pub mod kitti;
+pub(crate) mod kitti;
 pub mod opencv;
 pub mod rig;
 pub mod ros;
@@ -15,7 +15,7 @@ use std::path::Path;
 use egomotion::geometry::{StereoRectification, StereoRig};
 
 pub use camera::{CameraModel, RawPair};
-pub use kitti::{Calibration, CameraPair, write};
+pub use kitti::{CameraPair, KittiCalibration};
 
 use crate::{IoError, read};
 use document::Document;
@@ -26,7 +26,7 @@ use document::Document;
 #[derive(Debug, Clone, PartialEq)]
 pub enum StereoCalibration {
     /// KITTI's projections of rectified images, of a grey pair, a colour pair or both.
-    Kitti(Calibration),
+    Kitti(KittiCalibration),
     /// The rig of rectified images; of size 0×0 where the file does not tell it.
     Rectified(StereoRig),
     /// Two cameras as they are: their images must be rectified.
@@ -45,7 +45,7 @@ pub struct CalibratedPair {
 
 /// A format of calibration files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
+enum CalibrationFormat {
     Kitti,
     Euroc,
     Kalibr,
@@ -54,8 +54,8 @@ enum Format {
     Rig,
 }
 
-/// For messages.
-const KNOWN: &str = "give KITTI's calib.txt or calib_cam_to_cam.txt, EuRoC's sensor.yaml, a Kalibr camchain, OpenCV's stereo \
+/// The formats in words, for the errors of a file that has none of them.
+const KNOWN_FORMATS: &str = "give KITTI's calib.txt or calib_cam_to_cam.txt, EuRoC's sensor.yaml, a Kalibr camchain, OpenCV's stereo \
                      YAML or XML (M1 D1 M2 D2 R T), ROS CameraInfo (left.yaml, right.yaml) or a rig.toml";
 
 /// The calibration of a stereo pair: a file of any known format, told by its content, or a folder with
@@ -69,8 +69,9 @@ pub fn read(path: &Path) -> Result<StereoCalibration, IoError> {
     }
     let left = ["left.yaml", "cam0/sensor.yaml", "mav0/cam0/sensor.yaml", "rig.toml", "calib.txt"];
     let found = left.iter().map(|name| path.join(name)).find(|file| file.is_file());
-    let file =
-        found.ok_or_else(|| IoError::new(path, "is a folder without a calibration that is known", KNOWN))?;
+    let file = found.ok_or_else(|| {
+        IoError::new(path, "is a folder without a calibration that is known", KNOWN_FORMATS)
+    })?;
     parse(&read::text(&file)?, &file)
 }
 
@@ -85,15 +86,15 @@ pub fn parse(text: &str, path: &Path) -> Result<StereoCalibration, IoError> {
     let document = document.unwrap_or_else(Document::empty);
     let root = document.root(path);
     match format {
-        Format::Kitti => Calibration::parse(text, path).map(StereoCalibration::Kitti),
-        Format::Rig => rig::parse(text, path),
-        Format::OpenCv => opencv::pair(&root, path).map(StereoCalibration::Raw),
-        Format::Kalibr => kalibr::pair(&root).map(StereoCalibration::Raw),
-        Format::Euroc => {
+        CalibrationFormat::Kitti => KittiCalibration::parse(text, path).map(StereoCalibration::Kitti),
+        CalibrationFormat::Rig => rig::parse(text, path),
+        CalibrationFormat::OpenCv => opencv::pair(&root, path).map(StereoCalibration::Raw),
+        CalibrationFormat::Kalibr => kalibr::pair(&root).map(StereoCalibration::Raw),
+        CalibrationFormat::Euroc => {
             let (left, right) = euroc_partners(path)?;
             euroc::read_pair(&left, &right).map(StereoCalibration::Raw)
         }
-        Format::Ros => {
+        CalibrationFormat::Ros => {
             let (left, right) = ros::partners(path)?;
             ros::read_pair(&left, &right)
         }
@@ -101,28 +102,28 @@ pub fn parse(text: &str, path: &Path) -> Result<StereoCalibration, IoError> {
 }
 
 /// What a text is by its content, with the tree that was read on the way.
-fn recognise(text: &str, path: &Path) -> Result<(Format, Option<Document>), IoError> {
+fn recognise(text: &str, path: &Path) -> Result<(CalibrationFormat, Option<Document>), IoError> {
     if kitti::recognise(text) {
-        return Ok((Format::Kitti, None));
+        return Ok((CalibrationFormat::Kitti, None));
     }
     if looks_like_toml(text) {
-        return Ok((Format::Rig, None));
+        return Ok((CalibrationFormat::Rig, None));
     }
     let xml = text.trim_start().starts_with('<');
     let document = if xml { Document::xml(text, path) } else { Document::yaml(text, path) };
     // What is not even YAML is of no known format, and a parser's reason would not help.
-    let document = document.map_err(|error| IoError { advice: KNOWN.into(), ..error })?;
+    let document = document.map_err(|error| IoError { advice: KNOWN_FORMATS.into(), ..error })?;
     let root = document.root(path);
     let format = if root.find(&["T_BS"]).is_some() {
-        Format::Euroc
+        CalibrationFormat::Euroc
     } else if root.find(&["cam0"]).is_some() {
-        Format::Kalibr
+        CalibrationFormat::Kalibr
     } else if ros::recognise(&root) {
-        Format::Ros
+        CalibrationFormat::Ros
     } else if opencv::recognise(&root) {
-        Format::OpenCv
+        CalibrationFormat::OpenCv
     } else {
-        return Err(IoError::new(path, "is no calibration that is known", KNOWN));
+        return Err(IoError::new(path, "is no calibration that is known", KNOWN_FORMATS));
     };
     Ok((format, Some(document)))
 }

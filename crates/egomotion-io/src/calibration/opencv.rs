@@ -7,12 +7,12 @@ use std::path::Path;
 use egomotion::geometry::Distortion;
 use nalgebra::Vector3;
 
-use super::camera::{CameraModel, RawPair, coefficients, distortion, list, whole};
+use super::camera::{CameraModel, RawPair, coefficients, comma_separated, distortion, whole_size};
 use super::document::{Document, Entry};
 use crate::{IoError, read, write};
 
-/// Names of the left and right camera's matrix and distortion, and of the pose.
-const MATRIX: [&[&str]; 2] = [
+/// Keys of the left and of the right camera's matrix, in the order in which they are looked for.
+const MATRIX_KEYS: [&[&str]; 2] = [
     &[
         "M1",
         "K1",
@@ -32,13 +32,17 @@ const MATRIX: [&[&str]; 2] = [
         "right_camera_matrix",
     ],
 ];
-const LENS: [&[&str]; 2] = [
+/// Keys of the left and of the right camera's distortion coefficients.
+const DISTORTION_KEYS: [&[&str]; 2] = [
     &["D1", "distCoeffs1", "dist_coeffs_1", "dist_coeffs1", "distortion_coefficients_1", "dist_coeffs_left"],
     &["D2", "distCoeffs2", "dist_coeffs_2", "dist_coeffs2", "distortion_coefficients_2", "dist_coeffs_right"],
 ];
-const ROTATION: &[&str] = &["R", "rotation_matrix"];
-const TRANSLATION: &[&str] = &["T", "t", "translation_vector"];
-const MODEL: &[&str] = &["distortion_model", "camera_model"];
+/// Keys of the rotation from the left camera's frame to the right one's.
+const ROTATION_KEYS: &[&str] = &["R", "rotation_matrix"];
+/// Keys of the translation that goes with it.
+const TRANSLATION_KEYS: &[&str] = &["T", "t", "translation_vector"];
+/// Keys of the distortion model's name.
+const MODEL_KEYS: &[&str] = &["distortion_model", "camera_model"];
 
 /// The pair of a file, or of its sister (see the module).
 ///
@@ -63,7 +67,8 @@ fn document(text: &str, path: &Path) -> Result<Document, IoError> {
 /// Whether a file has what only this format names so.
 pub(super) fn recognise(root: &Entry<'_>) -> bool {
     let root = &inner(root);
-    root.find(MATRIX[0]).is_some() || (root.find(ROTATION).is_some() && root.find(TRANSLATION).is_some())
+    root.find(MATRIX_KEYS[0]).is_some()
+        || (root.find(ROTATION_KEYS).is_some() && root.find(TRANSLATION_KEYS).is_some())
 }
 
 /// XML files have a root element of their own.
@@ -77,25 +82,25 @@ pub(super) fn pair(root: &Entry<'_>, path: &Path) -> Result<RawPair, IoError> {
         let name = path.file_name()?.to_str()?.replace(one, other);
         Some(path.with_file_name(name)).filter(|sister| sister != path && sister.is_file())
     };
-    let whole_file = (root.find(MATRIX[0]).is_some(), root.find(ROTATION).is_some());
+    let whole_file = (root.find(MATRIX_KEYS[0]).is_some(), root.find(ROTATION_KEYS).is_some());
     let other = match whole_file {
         (true, false) => sister("intrinsic", "extrinsic"),
         (false, true) => sister("extrinsic", "intrinsic"),
         _ => None,
     };
-    let Some(other) = other else { return of(&root, &root) };
+    let Some(other) = other else { return pair_of(&root, &root) };
     let other_document = document(&read::text(&other)?, &other)?;
     let other_root = inner(&other_document.root(&other));
-    if whole_file.0 { of(&root, &other_root) } else { of(&other_root, &root) }
+    if whole_file.0 { pair_of(&root, &other_root) } else { pair_of(&other_root, &root) }
 }
 
-fn of(intrinsics: &Entry<'_>, extrinsics: &Entry<'_>) -> Result<RawPair, IoError> {
+fn pair_of(intrinsics: &Entry<'_>, extrinsics: &Entry<'_>) -> Result<RawPair, IoError> {
     let size = match intrinsics.find(&["image_size", "imageSize", "size"]) {
         Some(entry) => Some(super::camera::size(&entry)?),
         None => {
             match (intrinsics.find(&["image_width", "width"]), intrinsics.find(&["image_height", "height"])) {
                 (Some(w), Some(h)) => {
-                    let found = whole(w.number()?, h.number()?);
+                    let found = whole_size(w.number()?, h.number()?);
                     Some(found.ok_or_else(|| w.refuse("is no image size", "give whole numbers of pixels"))?)
                 }
                 _ => None,
@@ -103,12 +108,12 @@ fn of(intrinsics: &Entry<'_>, extrinsics: &Entry<'_>) -> Result<RawPair, IoError
         }
     };
     let camera = |side: usize| {
-        let matrix = intrinsics.get(MATRIX[side])?;
-        let lens = intrinsics.get(LENS[side])?;
+        let matrix = intrinsics.get(MATRIX_KEYS[side])?;
+        let lens = intrinsics.get(DISTORTION_KEYS[side])?;
         // Without the name of a model four or five coefficients are the plumb bob, eight the rational one.
-        CameraModel::of_matrix(&matrix, distortion(intrinsics.find(MODEL).as_ref(), &lens)?, size)
+        CameraModel::of_matrix(&matrix, distortion(intrinsics.find(MODEL_KEYS).as_ref(), &lens)?, size)
     };
-    let rotation = extrinsics.get(ROTATION)?;
+    let rotation = extrinsics.get(ROTATION_KEYS)?;
     let turn = match rotation.all_numbers()?[..] {
         // A rotation vector, as some write it.
         [x, y, z] => {
@@ -117,7 +122,7 @@ fn of(intrinsics: &Entry<'_>, extrinsics: &Entry<'_>) -> Result<RawPair, IoError
         }
         _ => rotation.matrix()?,
     };
-    let translation = Vector3::from(extrinsics.get(TRANSLATION)?.numbers::<3>()?);
+    let translation = Vector3::from(extrinsics.get(TRANSLATION_KEYS)?.numbers::<3>()?);
     let right_from_left = rotation.rigid(turn, translation)?;
     Ok(RawPair { left: camera(0)?, right: camera(1)?, right_from_left, body_from_left: None })
 }
@@ -160,7 +165,7 @@ pub fn write_yaml(path: &Path, pair: &RawPair) -> Result<(), IoError> {
         text += &format!("image_width: {w}\nimage_height: {h}\n");
     }
     for (name, rows, cols, numbers) in entries(pair) {
-        let data = list(&numbers);
+        let data = comma_separated(&numbers);
         text += &format!(
             "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {cols}\n   dt: d\n   data: [ {data} ]\n"
         );
@@ -180,7 +185,7 @@ pub fn write_xml(path: &Path, pair: &RawPair) -> Result<(), IoError> {
         text += &format!("<image_width>{w}</image_width>\n<image_height>{h}</image_height>\n");
     }
     for (name, rows, cols, numbers) in entries(pair) {
-        let data = list(&numbers).replace(',', "");
+        let data = comma_separated(&numbers).replace(',', "");
         text += &format!(
             "<{name} type_id=\"opencv-matrix\">\n  <rows>{rows}</rows>\n  <cols>{cols}</cols>\n  <dt>d</dt>\n  \
              <data>\n    {data}</data></{name}>\n"

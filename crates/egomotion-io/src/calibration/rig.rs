@@ -37,7 +37,7 @@ use std::path::Path;
 use egomotion::geometry::{Distortion, StereoRig};
 
 use super::StereoCalibration;
-use super::camera::{CameraModel, RawPair, coefficients, distortion, list, sixteen, size};
+use super::camera::{CameraModel, RawPair, coefficients, comma_separated, distortion, row_major_4x4, size};
 use super::document::{Document, Entry};
 use crate::{IoError, read, write};
 
@@ -127,11 +127,11 @@ pub fn write(path: &Path, calibration: &StereoCalibration) -> Result<(), IoError
                 format!(
                     "\n[{name}]\nfocal_px = [{fx:?}, {fy:?}]\ncentre_px = [{cx:?}, {cy:?}]\n\
                      distortion_model = \"{model}\"\ndistortion = [{}]\n{}",
-                    list(&coefficients(&camera.distortion)),
+                    comma_separated(&coefficients(&camera.distortion)),
                     sized(camera.size)
                 )
             };
-            let pose = list(&sixteen(&pair.right_from_left));
+            let pose = comma_separated(&row_major_4x4(&pair.right_from_left));
             format!(
                 "right_from_left = [{pose}]\n{}{}",
                 camera("left", &pair.left),

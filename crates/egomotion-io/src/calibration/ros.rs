@@ -7,7 +7,7 @@ use egomotion::geometry::{Distortion, RigidMotion, StereoRig};
 use nalgebra::{Matrix3, Vector3};
 
 use super::StereoCalibration;
-use super::camera::{CameraModel, RawPair, coefficients, distortion, list, whole};
+use super::camera::{CameraModel, RawPair, coefficients, comma_separated, distortion, whole_size};
 use super::document::{Document, Entry};
 use crate::{IoError, read, write};
 
@@ -44,7 +44,7 @@ pub(super) fn recognise(root: &Entry<'_>) -> bool {
 
 fn info(root: &Entry<'_>) -> Result<CameraInfo, IoError> {
     let (w, h) = (root.get(&["image_width", "width"])?, root.get(&["image_height", "height"])?);
-    let size = whole(w.number()?, h.number()?)
+    let size = whole_size(w.number()?, h.number()?)
         .ok_or_else(|| w.refuse("is no image size", "give whole numbers of pixels"))?;
     let lens = distortion(
         root.find(&["distortion_model", "camera_model"]).as_ref(),
@@ -84,7 +84,7 @@ pub(super) fn partners(path: &Path) -> Result<(PathBuf, PathBuf), IoError> {
 ///
 /// # Errors
 /// As [`read()`]; and what of the two does not fit together.
-pub fn read_pair(left: &Path, right: &Path) -> Result<StereoCalibration, IoError> {
+pub(super) fn read_pair(left: &Path, right: &Path) -> Result<StereoCalibration, IoError> {
     let (l, r) = (read(left)?, read(right)?);
     let p = &r.projection;
     let refuse =
@@ -147,7 +147,7 @@ pub fn write(path: &Path, info: &CameraInfo) -> Result<(), IoError> {
     }
     let matrix = |name: &str, rows: usize, numbers: &[f64]| {
         let cols = numbers.len() / rows;
-        format!("{name}:\n  rows: {rows}\n  cols: {cols}\n  data: [{}]\n", list(numbers))
+        format!("{name}:\n  rows: {rows}\n  cols: {cols}\n  data: [{}]\n", comma_separated(numbers))
     };
     let text = format!(
         "image_width: {width}\nimage_height: {height}\ncamera_name: camera\n{}distortion_model: {model}\n{}{}{}",

@@ -14,15 +14,15 @@ use egomotion::metrics::{
 use serde_json::{Value, json};
 
 use crate::IoError;
-use crate::trajectory::Format;
-pub use stated::Stated;
+use crate::tables::trajectory::TrajectoryFormat;
+pub use stated::StatedUncertainty;
 use trajectories::Compared;
 
 /// How trajectories are compared.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Options {
-    /// Format of both files; `None` is told by their rows.
-    pub format: Option<Format>,
+pub struct EvaluationOptions {
+    /// TrajectoryFormat of both files; `None` is told by their rows.
+    pub format: Option<TrajectoryFormat>,
     /// Whether poses belong to each other by their time stamps, where both have them, or row by row.
     pub by_time: bool,
     /// Time stamps farther apart than this do not belong to each other, in seconds.
@@ -37,7 +37,7 @@ pub struct Options {
     pub truth_sigma: [f64; 6],
 }
 
-impl Default for Options {
+impl Default for EvaluationOptions {
     /// Those of the command: by time, laid over the truth, relative motions over a second and a metre.
     fn default() -> Self {
         Self {
@@ -54,7 +54,7 @@ impl Default for Options {
 
 /// Errors of the relative motions over one distance.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Over {
+pub struct RelativeErrors {
     /// The distance, as it was named.
     pub name: String,
     /// Of translation, in metres.
@@ -73,7 +73,7 @@ pub struct Evaluation {
     /// Errors from frame to frame.
     pub step: RelativePoseError,
     /// Errors over longer distances.
-    pub over: Vec<Over>,
+    pub relative: Vec<RelativeErrors>,
     /// Drift; `None` where the path is shorter than all lengths.
     pub drift: Option<Drift>,
     /// What was laid over the truth; nothing where the positions determine no alignment.
@@ -83,7 +83,7 @@ pub struct Evaluation {
     /// Errors of position, in metres.
     pub absolute_m: Option<ErrorStatistics>,
     /// Whether the stated uncertainty is true, where the estimate is the folder of a run.
-    pub stated: Option<Stated>,
+    pub stated: Option<StatedUncertainty>,
     /// What the user should know of the comparison.
     pub warnings: Vec<String>,
 }
@@ -95,7 +95,7 @@ impl Evaluation {
     ///
     /// # Errors
     /// A file cannot be read, or fewer than two poses belong to each other.
-    pub fn of(estimate: &Path, truth: &Path, options: &Options) -> Result<Self, IoError> {
+    pub fn of(estimate: &Path, truth: &Path, options: &EvaluationOptions) -> Result<Self, IoError> {
         let compared = Compared::read(estimate, truth, options)?;
         let mut warnings: Vec<String> = compared.warning.iter().cloned().collect();
         let (mut alignment, true_poses) = (options.alignment, &compared.truth);
@@ -119,18 +119,18 @@ impl Evaluation {
                 ErrorStatistics::of(&errors.iter().map(value).collect::<Vec<_>>())
             };
             let (translation_m, rotation_deg) = (of(|e| e.translation_m)?, of(|e| e.rotation_deg)?);
-            Some(Over { name: name.clone(), translation_m, rotation_deg })
+            Some(RelativeErrors { name: name.clone(), translation_m, rotation_deg })
         };
         Ok(Self {
             poses: true_poses.len(),
             associated_by: compared.how,
             step,
-            over: options.deltas.iter().filter_map(over).collect(),
+            relative: options.deltas.iter().filter_map(over).collect(),
             drift: kitti_drift(&aligned, true_poses, &options.lengths_m),
             alignment,
             scale: laid.scale,
             absolute_m: ErrorStatistics::of(&absolute_errors_m(&aligned, true_poses)),
-            stated: Stated::read(estimate, truth, options)?,
+            stated: StatedUncertainty::read(estimate, truth, options)?,
             warnings,
         })
     }
@@ -140,7 +140,7 @@ impl Evaluation {
             json!({ "rmse": s.rmse, "mean": s.mean, "median": s.median, "std": s.std, "min": s.min,
                     "max": s.max, "sse": s.sse })
         };
-        let over = |o: &Over| {
+        let over = |o: &RelativeErrors| {
             json!({ "delta": o.name, "pairs": o.translation_m.count,
                     "translation_m": spread(&o.translation_m), "rotation_deg": spread(&o.rotation_deg) })
         };
@@ -155,11 +155,11 @@ impl Evaluation {
             "drift_percent": self.drift.map(|d| d.percent),
             "drift_deg_per_m": self.drift.map(|d| d.deg_per_m),
             "segments": self.drift.map_or(0, |d| d.segments),
-            "relative": self.over.iter().map(over).collect::<Vec<_>>(),
+            "relative": self.relative.iter().map(over).collect::<Vec<_>>(),
             "alignment": self.alignment.name(),
             "scale": self.scale,
             "absolute_m": self.absolute_m.as_ref().map(spread),
-            "stated": self.stated.as_ref().map(Stated::json),
+            "stated": self.stated.as_ref().map(StatedUncertainty::json),
         })
     }
 }

@@ -7,23 +7,27 @@ use egomotion::geometry::{RigidMotion, Twist};
 use egomotion::metrics::{Coverage, Nees, associate};
 use serde_json::{Value, json};
 
-use super::Options;
+use super::EvaluationOptions;
 use super::trajectories::poses;
 use crate::IoError;
-use crate::motion_table::{self, MotionRow};
+use crate::tables::motion_table::{self, MotionRow};
 
 /// NEES and coverage of φ.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Stated {
+pub struct StatedUncertainty {
     /// Over whole motions.
     pub nees: Nees,
     /// Of the components' 95 % intervals.
     pub components: Coverage,
 }
 
-impl Stated {
+impl StatedUncertainty {
     /// `None` where the estimate is not the folder of a run, or the truth has no time stamps.
-    pub(super) fn read(estimate: &Path, truth: &Path, options: &Options) -> Result<Option<Self>, IoError> {
+    pub(super) fn read(
+        estimate: &Path,
+        truth: &Path,
+        options: &EvaluationOptions,
+    ) -> Result<Option<Self>, IoError> {
         let file = estimate.join("motion.csv");
         if !file.is_file() {
             return Ok(None);
@@ -40,7 +44,7 @@ impl Stated {
         Ok((stated.nees.count > 0).then_some(stated))
     }
 
-    fn add(&mut self, row: &MotionRow, times_s: &[f64], truth: &[RigidMotion], options: &Options) {
+    fn add(&mut self, row: &MotionRow, times_s: &[f64], truth: &[RigidMotion], options: &EvaluationOptions) {
         let Some(motion) = row.motion.as_ref().filter(|motion| motion.is_complete()) else { return };
         let Some(dt_s) = row.dt_s else { return };
         let at = associate(&[row.time_s - dt_s, row.time_s], times_s, options.largest_gap_s);

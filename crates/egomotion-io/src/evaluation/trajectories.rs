@@ -5,13 +5,13 @@ use std::path::Path;
 use egomotion::geometry::RigidMotion;
 use egomotion::metrics::associate;
 
-use super::Options;
+use super::EvaluationOptions;
 use crate::IoError;
 use crate::source::{FrameFiles, Source};
-use crate::trajectory::{self, Format, Pose};
+use crate::tables::trajectory::{self, Pose, TrajectoryFormat};
 
 /// Poses that belong to each other.
-pub struct Compared {
+pub(super) struct Compared {
     pub estimate: Vec<RigidMotion>,
     pub truth: Vec<RigidMotion>,
     /// Time stamps of the truth, where it has them.
@@ -23,7 +23,11 @@ pub struct Compared {
 }
 
 impl Compared {
-    pub fn read(estimate_path: &Path, truth_path: &Path, options: &Options) -> Result<Self, IoError> {
+    pub(super) fn read(
+        estimate_path: &Path,
+        truth_path: &Path,
+        options: &EvaluationOptions,
+    ) -> Result<Self, IoError> {
         let (estimate, truth) = (poses(estimate_path, options.format)?, poses(truth_path, options.format)?);
         let (at, true_at) = (times(&estimate), times(&truth));
         let (pairs, by_time) = match (&at, &true_at, options.by_time) {
@@ -65,13 +69,13 @@ fn times(poses: &[Pose]) -> Option<Vec<f64>> {
 }
 
 /// A trajectory file, the folder of a run, or a recording with true poses.
-pub fn poses(path: &Path, format: Option<Format>) -> Result<Vec<Pose>, IoError> {
+pub(super) fn poses(path: &Path, format: Option<TrajectoryFormat>) -> Result<Vec<Pose>, IoError> {
     if !path.is_dir() {
         return trajectory::read(path, format);
     }
     let ours = path.join("trajectory_tum.txt");
     if ours.is_file() {
-        return trajectory::read(&ours, Some(Format::Tum));
+        return trajectory::read(&ours, Some(TrajectoryFormat::Tum));
     }
     let source = Source::open(path)?;
     let frames = source.sequences.first().map(|sequence| &sequence.frames[..]).unwrap_or_default();

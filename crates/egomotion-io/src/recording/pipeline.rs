@@ -8,7 +8,7 @@ use egomotion::pipeline::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Fetched, Given};
+use super::source_frame::{FrameInput, SourceFrame};
 
 /// What turns frames of either kind into motion.
 #[derive(Debug)]
@@ -39,13 +39,13 @@ impl Pipeline {
         Ok(Self::Images(Box::new(images)))
     }
 
-    /// The motion from the last good frame to what is given of this time.
-    pub fn push(&mut self, time_s: f64, given: Result<Given, Unanswered>) -> FrameMotion {
-        match (self, given) {
-            (Self::Images(images), Ok(Given::Frame(frame))) => images.push(*frame),
-            (Self::Tracks(tracks), Ok(Given::Tracks(points))) => tracks.push(time_s, &points),
-            (Self::Images(images), given) => images.skip(time_s, reason(given)),
-            (Self::Tracks(tracks), given) => tracks.skip(time_s, reason(given)),
+    /// The motion from the last good frame to the input of this time.
+    pub fn push(&mut self, time_s: f64, input: Result<FrameInput, Unanswered>) -> FrameMotion {
+        match (self, input) {
+            (Self::Images(images), Ok(FrameInput::Images(frame))) => images.push(*frame),
+            (Self::Tracks(tracks), Ok(FrameInput::Tracks(points))) => tracks.push(time_s, &points),
+            (Self::Images(images), input) => images.skip(time_s, reason(input)),
+            (Self::Tracks(tracks), input) => tracks.skip(time_s, reason(input)),
         }
     }
 
@@ -76,25 +76,25 @@ impl Pipeline {
         }
     }
 
-    /// Go on from a memory; the reference frame is fetched again, and its left image given back.
+    /// Go on from a memory; the reference frame is read again, and its left image given back.
     ///
     /// # Errors
     /// The memory is not of such frames, or the reference frame cannot be read again.
     pub fn recall(
         &mut self,
         memory: Memory,
-        fetch: impl FnOnce(usize) -> Option<Fetched>,
+        read: impl FnOnce(usize) -> Option<SourceFrame>,
     ) -> Result<Option<Image>, RecallError> {
         match (self, memory) {
             (Self::Images(images), Memory::Images(memory)) => {
                 let mut left = None;
                 let reference = memory.reference_frame().unwrap_or_default();
-                let again = |k| match fetch(k).map(|fetched| fetched.frame) {
-                    Some(Ok(Given::Frame(frame))) => {
+                let again = |k| match read(k).map(|frame| frame.input) {
+                    Some(Ok(FrameInput::Images(frame))) => {
                         left = Some(frame.left.clone());
                         Ok(*frame)
                     }
-                    Some(given) => Err(reason(given)),
+                    Some(input) => Err(reason(input)),
                     None => Err(Unanswered::BadImage("it is no longer there".into())),
                 };
                 images.recall(memory, again).map_err(|why| RecallError::Frame { reference, why })?;
@@ -128,6 +128,6 @@ pub enum RecallError {
 }
 
 /// Why nothing can be pushed.
-fn reason(given: Result<Given, Unanswered>) -> Unanswered {
-    given.err().unwrap_or_else(|| Unanswered::BadImage("images and tracks are mixed".into()))
+fn reason(input: Result<FrameInput, Unanswered>) -> Unanswered {
+    input.err().unwrap_or_else(|| Unanswered::BadImage("images and tracks are mixed".into()))
 }

@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use super::FrameFiles;
+use super::layout::KNOWN_LAYOUTS;
+use super::sequence::FrameFiles;
 use crate::{IoError, image};
 
 /// The images of a folder by the key that `key` finds in their stems; empty if there is no such folder.
@@ -12,7 +13,7 @@ pub(super) fn numbered<K: Ord>(
     folder: &Path,
     key: impl Fn(&str) -> Option<K>,
 ) -> Result<BTreeMap<K, PathBuf>, IoError> {
-    by_key(folder, key, image::is_named_like_one)
+    by_key(folder, key, image::has_image_extension)
 }
 
 /// The text files of a folder in the same way.
@@ -96,7 +97,7 @@ pub(super) fn image_size(frames: &[FrameFiles]) -> Result<(usize, usize), IoErro
     match first {
         Some(Err(error)) => files.find_map(|path| image::size(path).ok()).ok_or(error),
         Some(size) => size,
-        None => Err(IoError::new(Path::new(""), "no images", super::KNOWN)),
+        None => Err(IoError::new(Path::new(""), "no images", KNOWN_LAYOUTS)),
     }
 }
 

@@ -7,9 +7,10 @@ use std::path::Path;
 use ::image as image_crate;
 use egomotion::geometry::{Distortion, Field, Gaussian, Grid, RigidMotion};
 use egomotion_io::calibration::{
-    self, Calibration, CameraModel, CameraPair, RawPair, StereoCalibration, euroc, kalibr, opencv, rig, ros,
+    self, CameraModel, CameraPair, KittiCalibration, RawPair, StereoCalibration, euroc, kalibr, opencv, rig,
+    ros,
 };
-use egomotion_io::motion_table::{self, Motion, MotionRow};
+use egomotion_io::motion_table::{self, EstimatedMotion, MotionRow};
 use egomotion_io::trajectory::{self, Pose};
 use egomotion_io::{IoError, depth, disparity_png, flo, flow_png, image, npy, pfm, stream, tracks};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
@@ -120,7 +121,7 @@ pub fn kinds() -> Vec<(&'static str, Vec<u8>, Reader, bool)> {
             "stream.png",
             [0, 1].map(|_| written(&|p| image::write_grey(p, field().grid()).unwrap())).concat(),
             |c, p| {
-                let mut images = stream::ImageStream::new(c, stream::Kind::Png, p);
+                let mut images = stream::ImageStream::new(c, stream::StreamFormat::Png, p);
                 // Something must come of it, and a stream may end after any image.
                 let first = images.next_image()?.ok_or_else(|| IoError::new(p, "is empty", "give images"))?;
                 assert!(first.width() > 0);
@@ -157,7 +158,7 @@ pub fn kinds() -> Vec<(&'static str, Vec<u8>, Reader, bool)> {
             "calib.txt",
             calibration.to_vec(),
             |c, p| {
-                let calibration = Calibration::parse(&String::from_utf8_lossy(c), p)?;
+                let calibration = KittiCalibration::parse(&String::from_utf8_lossy(c), p)?;
                 calibration.left_centre(CameraPair::Grey)?;
                 calibration.rig(CameraPair::Grey, (1242, 375)).map(|rig| assert!(rig.check().is_ok()))
             },
@@ -197,7 +198,7 @@ fn encoded(format: image_crate::ImageFormat) -> Vec<u8> {
 
 fn motion_row() -> MotionRow {
     let phi = Gaussian { mean: Vector6::new(0.1, 0.2, -1.0, 1e-3, 2e-3, 0.0), cov: Matrix6::identity() };
-    let motion = Motion { phi, observed: [true; 6], rows: 900, inliers: 800 };
+    let motion = EstimatedMotion { phi, observed: [true; 6], rows: 900, inliers: 800 };
     MotionRow {
         frame: 7,
         time_s: 0.7,

@@ -6,7 +6,7 @@ mod kinds;
 use std::fs;
 use std::path::Path;
 
-use egomotion_io::calibration::Calibration;
+use egomotion_io::calibration::KittiCalibration;
 use egomotion_io::image;
 use kinds::{Reader, kinds, target};
 use rand::{RngExt, SeedableRng};
@@ -115,7 +115,9 @@ fn files_that_cannot_be_read_are_named() {
     assert!(image::read(folder.path()).is_err());
     let binary = folder.path().join("calib.txt");
     fs::write(&binary, [0xff, 0xfe, 0x00]).unwrap();
-    assert!(Calibration::read(&binary).unwrap_err().to_string().contains("calib.txt: is not a text file"));
+    assert!(
+        KittiCalibration::read(&binary).unwrap_err().to_string().contains("calib.txt: is not a text file")
+    );
 }
 
 /// What fuzzing found, in a folder for each target.

@@ -32,7 +32,7 @@ def check(options: dict[str, Any], chunk: int | None, overlap: int) -> None:
     try:
         # Settings are looked at before the recording.
         egomotion.run("", **options)
-    except egomotion.ReadError:
+    except egomotion.FileError:
         pass
 
 
@@ -41,7 +41,7 @@ def leave(chunk: Chunk, results: Results, options: dict[str, Any]) -> str | None
     one_task_of_many(options.get("threads") or 1)
     try:
         rows = _rows(chunk, options)
-    except (egomotion.ReadError, ValueError) as error:
+    except (egomotion.FileError, ValueError) as error:
         return str(error)
     except Exception as error:
         # Whatever the library of a store may raise: one recording must not end all.

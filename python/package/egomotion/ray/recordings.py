@@ -64,7 +64,7 @@ def find(source: str, calibration: str | None) -> list[str]:
 def _is_recording(path: Path, calibration: str | None) -> bool:
     try:
         return bool(egomotion.sequences(path, calibration=calibration))
-    except egomotion.ReadError:
+    except egomotion.FileError:
         return False
 
 

@@ -1,0 +1,7 @@
+//! Tables, one row for each frame: motion, poses, points of tracks.
+
+#[cfg(feature = "parquet")]
+pub mod motion_parquet;
+pub mod motion_table;
+pub mod tracks;
+pub mod trajectory;
