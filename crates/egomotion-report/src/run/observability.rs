@@ -3,21 +3,23 @@
 use maud::{Markup, html};
 
 use super::charts::{cursor, line, time_scale, unanswered, view_box};
-use super::series::{Series, Timeline};
-use super::{FrameRow, Interval, Report};
+use super::interval::Interval;
+use super::report::{FrameRow, Report};
+use super::time_series::TimeSeries;
+use super::timeline::Timeline;
+use crate::chart::axes::{Axes, AxisScale, MARGIN, extent};
 use crate::chart::number::significant;
-use crate::chart::plot::{Axes, MARGIN, Scale, extent};
 
-/// Width and height of the chart of measurements, in SVG units.
-const SIZE: (f64, f64) = (400.0, 170.0);
-/// Height of a lane.
-const LANE: f64 = 20.0;
+/// Width and height of the chart of measurements, in SVG units, which are pixels on a phone.
+const CHART_SIZE: (f64, f64) = (400.0, 170.0);
+/// Height of the lane of one component, in SVG units: its name fits beside it.
+const LANE_HEIGHT: f64 = 20.0;
 
 /// The components in φ's order, as a driver would name them.
-const WORDS: [&str; 6] = ["sideways", "up and down", "forward", "pitch", "yaw", "roll"];
+const COMPONENT_NAMES: [&str; 6] = ["sideways", "up and down", "forward", "pitch", "yaw", "roll"];
 
 /// The measurements that were kept, in thousands where they are many; the band goes up to all.
-pub fn series(timeline: &Timeline<'_>) -> Series {
+pub(crate) fn series(timeline: &Timeline<'_>) -> TimeSeries {
     let most = timeline.rows.iter().filter_map(|row| Some(row.motion.as_ref()?.rows)).max().unwrap_or(0);
     let (factor, unit) = if most >= 10_000 { (1e-3, "thousand") } else { (1.0, "") };
     let value = |row: &&FrameRow| {
@@ -25,7 +27,7 @@ pub fn series(timeline: &Timeline<'_>) -> Series {
         let [kept, all] = [motion.inliers, motion.rows].map(|n| factor * n as f64);
         Some(Interval { value: kept, low: kept, high: all })
     };
-    Series {
+    TimeSeries {
         id: "kept".into(),
         name: "Measurements kept, and all".into(),
         unit: unit.into(),
@@ -35,7 +37,7 @@ pub fn series(timeline: &Timeline<'_>) -> Series {
 }
 
 /// One sentence on the measurements.
-pub fn sentence(report: &Report<'_>) -> Option<String> {
+pub(crate) fn sentence(report: &Report<'_>) -> Option<String> {
     let motions = || report.frames.iter().filter_map(|row| row.motion.as_ref());
     let of = |n: &dyn Fn(&egomotion::estimate::MotionEstimate) -> usize| {
         let mut all: Vec<f64> = motions().map(|motion| n(motion) as f64).collect();
@@ -51,13 +53,15 @@ pub fn sentence(report: &Report<'_>) -> Option<String> {
 }
 
 /// Kept measurements over time, between zero and all.
-pub fn measurements(timeline: &Timeline<'_>, series: &Series) -> Markup {
+pub(crate) fn measurements(timeline: &Timeline<'_>, series: &TimeSeries) -> Markup {
     let top = extent(series.values.iter().flatten().map(|v| v.high)).map_or(1.0, |(_, hi)| 1.1 * hi);
-    let axes =
-        Axes { x: time_scale(timeline, SIZE), y: Scale::linear((0.0, top), (SIZE.1 - MARGIN[3], MARGIN[2])) };
+    let axes = Axes {
+        x: time_scale(timeline, CHART_SIZE),
+        y: AxisScale::linear((0.0, top), (CHART_SIZE.1 - MARGIN[3], MARGIN[2])),
+    };
     let [left, _, width, _] = axes.inside();
     html! {
-        svg viewBox=(view_box(SIZE)) role="img" aria-label="measurements over time" data-series=(series.id)
+        svg viewBox=(view_box(CHART_SIZE)) role="img" aria-label="measurements over time" data-series=(series.id)
             data-inside=(format!("{left:.1} {width:.1}")) data-range=(format!("{:.4} {:.4}", axes.x.range().0, axes.x.range().1)) {
             (axes.grid(timeline.name, "", (6, 4)))
             path class="all" d=(line(timeline, &axes, series.values.iter().map(|v| v.map(|v| v.high)))) {}
@@ -75,29 +79,29 @@ fn counts(rows: &[FrameRow]) -> ([usize; 6], usize) {
 }
 
 /// A lane for each component, filled where it was determined, with how often in words.
-pub fn lanes(report: &Report<'_>, timeline: &Timeline<'_>) -> Markup {
+pub(crate) fn lanes(report: &Report<'_>, timeline: &Timeline<'_>) -> Markup {
     let (counts, answered) = counts(report.frames);
     // Room for the words at the left, and for how often, at 6.5 a character, at the right.
     let said = |count: usize| format!("{count} of {answered}");
-    let (left, right) = (84.0, SIZE.0 - 10.0 - 6.5 * said(answered).len() as f64);
+    let (left, right) = (84.0, CHART_SIZE.0 - 10.0 - 6.5 * said(answered).len() as f64);
     let axes = Axes {
-        x: Scale::linear(timeline.range, (left, right)),
-        y: Scale::linear((0.0, 6.0), (6.0 * LANE, 0.0)),
+        x: AxisScale::linear(timeline.range, (left, right)),
+        y: AxisScale::linear((0.0, 6.0), (6.0 * LANE_HEIGHT, 0.0)),
     };
     let wide = ((right - left) / timeline.times.len().max(1) as f64).max(0.6);
     let marks = |i: usize, wanted: bool| -> String {
         let there = |row: &FrameRow| row.motion.as_ref().is_some_and(|motion| motion.observed[i] == wanted);
         let rows = timeline.times.iter().zip(&timeline.rows).filter(|(_, row)| there(row));
-        let top = LANE * i as f64 + 4.0;
+        let top = LANE_HEIGHT * i as f64 + 4.0;
         rows.filter_map(|(&t, _)| Some(format!("M{:.1} {top:.0}v12", axes.x.at(t)?))).collect()
     };
     html! {
-        svg viewBox=(view_box((SIZE.0, 6.0 * LANE + 2.0))) role="img" aria-label="which components were determined, over time" {
-            @for (i, word) in WORDS.iter().enumerate() {
-                text x=(format!("{:.1}", left - 6.0)) y=(format!("{:.1}", LANE * i as f64 + 14.0)) text-anchor="end" { (word) }
+        svg viewBox=(view_box((CHART_SIZE.0, 6.0 * LANE_HEIGHT + 2.0))) role="img" aria-label="which components were determined, over time" {
+            @for (i, word) in COMPONENT_NAMES.iter().enumerate() {
+                text x=(format!("{:.1}", left - 6.0)) y=(format!("{:.1}", LANE_HEIGHT * i as f64 + 14.0)) text-anchor="end" { (word) }
                 path class="determined" stroke-width=(format!("{wide:.2}")) d=(marks(i, true)) {}
                 path class="undetermined" stroke-width=(format!("{wide:.2}")) d=(marks(i, false)) {}
-                text x=(format!("{:.1}", right + 6.0)) y=(format!("{:.1}", LANE * i as f64 + 14.0)) { (said(counts[i])) }
+                text x=(format!("{:.1}", right + 6.0)) y=(format!("{:.1}", LANE_HEIGHT * i as f64 + 14.0)) { (said(counts[i])) }
             }
             (cursor(timeline, &axes))
         }
@@ -105,7 +109,7 @@ pub fn lanes(report: &Report<'_>, timeline: &Timeline<'_>) -> Markup {
 }
 
 /// What could not be determined, in words, with how often; the most frequent first.
-pub fn undetermined(rows: &[FrameRow]) -> Vec<(String, usize)> {
+pub(crate) fn undetermined(rows: &[FrameRow]) -> Vec<(String, usize)> {
     let mut free: Vec<(String, usize)> = Vec::new();
     for motion in rows.iter().filter_map(|row| row.motion.as_ref()).filter(|m| !m.is_complete()) {
         let words = motion.undetermined.to_string();

@@ -3,9 +3,11 @@
 use egomotion::geometry::Twist;
 use maud::{Markup, html};
 
-use super::charts::{self, SMALL};
-use super::series::{Series, Timeline};
-use super::{FrameRow, Interval};
+use super::charts::{self, COMPONENT_CHART_SIZE};
+use super::interval::Interval;
+use super::report::FrameRow;
+use super::time_series::TimeSeries;
+use super::timeline::Timeline;
 use crate::chart::number::{DEGREES, Unit, length, significant};
 
 /// A component of the camera's velocity: its name, what its negative is, the component of φ and its sign.
@@ -29,19 +31,19 @@ const COMPONENTS: [Component; 6] = [
 ];
 
 /// Speed of the camera at a row, in metres per second; `None` unless the whole shift is known.
-pub fn speed_m_s(row: &FrameRow) -> Option<f64> {
+pub(crate) fn speed_m_s(row: &FrameRow) -> Option<f64> {
     let dt = row.interval_s()?;
     let shift = [row.component(0)?.0, row.component(1)?.0, row.component(2)?.0];
     Some(shift.iter().map(|v| v * v).sum::<f64>().sqrt() / dt)
 }
 
 /// The unit of speeds up to the run's greatest.
-pub fn speed_unit(rows: &[FrameRow]) -> Unit {
+pub(crate) fn speed_unit(rows: &[FrameRow]) -> Unit {
     length(rows.iter().filter_map(speed_m_s).fold(0.0, f64::max))
 }
 
 /// The six components, speeds in `metres` per second.
-pub fn series(timeline: &Timeline<'_>, metres: Unit) -> Vec<Series> {
+pub(crate) fn velocity_series(timeline: &Timeline<'_>, metres: Unit) -> Vec<TimeSeries> {
     COMPONENTS.iter().enumerate().map(|(k, component)| component.series(timeline, metres, k)).collect()
 }
 
@@ -50,7 +52,7 @@ impl Component {
         if self.phi < 3 { metres } else { DEGREES }
     }
 
-    fn series(&self, timeline: &Timeline<'_>, metres: Unit, k: usize) -> Series {
+    fn series(&self, timeline: &Timeline<'_>, metres: Unit, k: usize) -> TimeSeries {
         let unit = self.unit(metres);
         let rate = |row: &FrameRow| Some(self.sign * unit.factor / row.interval_s()?);
         let value = |row: &&FrameRow| {
@@ -58,7 +60,7 @@ impl Component {
             Some(Interval::around(value * rate, sigma * rate.abs()))
         };
         let truth = |row: &&FrameRow| Some(Twist::vector(&row.truth?)[self.phi] * rate(row)?);
-        Series {
+        TimeSeries {
             id: format!("body-{k}"),
             name: self.name.to_owned(),
             unit: format!("{}/s", unit.name),
@@ -69,7 +71,7 @@ impl Component {
 }
 
 /// The six charts.
-pub fn charts(timeline: &Timeline<'_>, all: &[Series]) -> Markup {
+pub(crate) fn charts(timeline: &Timeline<'_>, all: &[TimeSeries]) -> Markup {
     html! {
         div class="charts" {
             @for (component, series) in COMPONENTS.iter().zip(all) {
@@ -81,7 +83,7 @@ pub fn charts(timeline: &Timeline<'_>, all: &[Series]) -> Markup {
                             @if series.usual_band().is_finite() { "; known to ±" (significant(series.usual_band(), 2)) " " (series.unit) }
                         }
                     }
-                    (charts::chart(timeline, series, &charts::axes(timeline, charts::value_range(series), SMALL), SMALL))
+                    (charts::chart(timeline, series, &charts::axes(timeline, charts::value_range(series), COMPONENT_CHART_SIZE), COMPONENT_CHART_SIZE))
                 }
             }
         }
@@ -93,7 +95,7 @@ mod tests {
     use egomotion::geometry::RigidMotion;
     use nalgebra::{Vector3, Vector6};
 
-    use super::super::Album;
+    use super::super::album::Album;
     use super::super::tests::Run;
     use super::*;
 
@@ -111,7 +113,7 @@ mod tests {
         let album = Album::of(2);
         let timeline = Timeline::of(&run.report(&album));
         let expected = [20.0, 1.0, 0.5, 0.2_f64.to_degrees(), 0.1_f64.to_degrees(), 0.3_f64.to_degrees()];
-        for (series, expected) in series(&timeline, speed_unit(&run.rows)).iter().zip(expected) {
+        for (series, expected) in velocity_series(&timeline, speed_unit(&run.rows)).iter().zip(expected) {
             let value = series.values[1].unwrap();
             assert!((value.value - expected).abs() < 1e-9, "{}: {value:?}", series.name);
             // σ is 1 mm or 1 mrad an interval, so the band is four times ten of them wide.

@@ -1,16 +1,18 @@
-//! What went wrong, in plain words.
+//! What to know before trusting a run, in plain words.
 
-use super::{Report, observed};
+use super::observability;
+use super::report::Report;
 use crate::chart::number::{count, significant};
 
-/// Most frames that are named in a sentence.
-const MOST_NAMED: usize = 8;
+/// Most frames that are named in a sentence, so that it stays one.
+const MAX_NAMED: usize = 8;
 
-/// Bands that hold the truth less often than this are not what they say.
-const DOUBTFUL: f64 = 0.85;
+/// Share of the true values in their 95 % bands below which the bands are doubted. A larger value warns of short runs
+/// whose share is low by chance; a smaller one overlooks bands that are too narrow.
+const DOUBTFUL_COVERAGE: f64 = 0.85;
 
-/// One sentence for each kind of trouble; none where all went well.
-pub fn trouble(report: &Report<'_>) -> Vec<String> {
+/// One sentence for each kind of warning; none where all went well.
+pub(crate) fn sentences(report: &Report<'_>) -> Vec<String> {
     let mut all = Vec::new();
     if !report.complete {
         all.push("The run was stopped before its end: this page covers the frames that were done.".into());
@@ -18,7 +20,7 @@ pub fn trouble(report: &Report<'_>) -> Vec<String> {
     all.extend(unanswered(report));
     all.extend(partial(report));
     all.extend(report.notes.iter().cloned());
-    if let Some((share, components)) = coverage(report).filter(|(share, _)| *share < DOUBTFUL) {
+    if let Some((share, components)) = coverage(report).filter(|(share, _)| *share < DOUBTFUL_COVERAGE) {
         all.push(format!(
             "Of {components} true values only {} % lie in their 95 % band: the truth is less exact than the estimate, or the stated uncertainty is too small.",
             significant(100.0 * share, 2)
@@ -37,8 +39,8 @@ fn unanswered(report: &Report<'_>) -> Vec<String> {
         }
     }
     let sentence = |(status, frames): (&str, Vec<usize>)| {
-        let named: Vec<String> = frames.iter().take(MOST_NAMED).map(usize::to_string).collect();
-        let more = if frames.len() > MOST_NAMED { ", …" } else { "" };
+        let named: Vec<String> = frames.iter().take(MAX_NAMED).map(usize::to_string).collect();
+        let more = if frames.len() > MAX_NAMED { ", …" } else { "" };
         let noun = if frames.len() == 1 { "frame" } else { "frames" };
         format!(
             "{} gave no motion: {} ({noun} {}{more}).",
@@ -65,7 +67,7 @@ fn in_words(status: &str) -> &str {
 }
 
 fn partial(report: &Report<'_>) -> Option<String> {
-    let free = observed::undetermined(report.frames);
+    let free = observability::undetermined(report.frames);
     let total: usize = free.iter().map(|(_, count)| count).sum();
     let (words, most) = free.first()?;
     let mostly = if *most == total { "" } else { "mostly: " };
@@ -76,7 +78,7 @@ fn partial(report: &Report<'_>) -> Option<String> {
 }
 
 /// The share of components whose truth lies in the 95 % band, and their number; `None` without truth.
-pub fn coverage(report: &Report<'_>) -> Option<(f64, usize)> {
+pub(crate) fn coverage(report: &Report<'_>) -> Option<(f64, usize)> {
     let judged = report.frames.iter().flat_map(|row| {
         let truth = row.truth.map(|t| t.vector());
         (0..6).filter_map(move |i| Some((row.component(i)?, truth?[i])))
@@ -84,13 +86,13 @@ pub fn coverage(report: &Report<'_>) -> Option<(f64, usize)> {
     let (mut within, mut all) = (0_usize, 0_usize);
     for ((value, sigma), truth) in judged.filter(|(_, truth)| truth.is_finite()) {
         all += 1;
-        within += usize::from((value - truth).abs() <= super::BAND * sigma);
+        within += usize::from((value - truth).abs() <= super::interval::BAND_HALF_WIDTH_SIGMA * sigma);
     }
     (all > 0).then(|| (within as f64 / all as f64, all))
 }
 
 /// Where nothing went wrong, it says so.
-pub fn all_well(report: &Report<'_>) -> Option<String> {
+pub(crate) fn all_well(report: &Report<'_>) -> Option<String> {
     let asked = report.frames.iter().filter(|row| row.asks()).count();
     let which = match asked {
         0 => return None,

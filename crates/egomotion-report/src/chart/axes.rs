@@ -1,4 +1,4 @@
-//! The parts of a chart: scales, ticks and paths. No coordinate that is not finite leaves this file.
+//! The parts of a chart: axes, ticks and paths. No coordinate that is not finite leaves this file.
 
 use std::fmt::Write as _;
 
@@ -8,15 +8,15 @@ use super::number::tick;
 
 /// From data to SVG units along one axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scale {
+pub(crate) struct AxisScale {
     from: (f64, f64),
     to: (f64, f64),
     log: bool,
 }
 
-impl Scale {
+impl AxisScale {
     /// A linear scale; an empty or broken range is opened around its middle.
-    pub fn linear((lo, hi): (f64, f64), to: (f64, f64)) -> Self {
+    pub(crate) fn linear((lo, hi): (f64, f64), to: (f64, f64)) -> Self {
         let (lo, hi) = if lo.is_finite() && hi.is_finite() { (lo, hi) } else { (0.0, 1.0) };
         let least = 1e-9 + 1e-9 * lo.abs().max(hi.abs());
         let from = if hi - lo > least { (lo, hi) } else { (lo - 0.5 * least, lo + 0.5 * least) };
@@ -24,19 +24,19 @@ impl Scale {
     }
 
     /// A logarithmic scale over a positive range.
-    pub fn log((lo, hi): (f64, f64), to: (f64, f64)) -> Self {
+    pub(crate) fn log((lo, hi): (f64, f64), to: (f64, f64)) -> Self {
         let lo = if lo.is_finite() && lo > 1e-290 { lo.min(1e290) } else { 1e-3 };
         let hi = if hi.is_finite() && hi > lo { hi } else { lo * 10.0 };
         Self { from: (lo, hi), to, log: true }
     }
 
     /// The range of data.
-    pub fn range(&self) -> (f64, f64) {
+    pub(crate) fn range(&self) -> (f64, f64) {
         self.from
     }
 
     /// Where `value` lies; far outside it is held near the edge, and what is not a number is nowhere.
-    pub fn at(&self, value: f64) -> Option<f64> {
+    pub(crate) fn at(&self, value: f64) -> Option<f64> {
         let f = |v: f64| if self.log { v.max(1e-300).ln() } else { v };
         let (lo, hi) = (f(self.from.0), f(self.from.1));
         let share = (f(value) - lo) / (hi - lo);
@@ -44,7 +44,7 @@ impl Scale {
     }
 
     /// About `n` round values with their labels.
-    pub fn ticks(&self, n: usize) -> Vec<(f64, String)> {
+    pub(crate) fn ticks(&self, n: usize) -> Vec<(f64, String)> {
         if n == 0 {
             return Vec::new();
         }
@@ -91,30 +91,30 @@ impl Scale {
 
 /// The frame a chart is drawn in: two scales, and what surrounds them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Axes {
+pub(crate) struct Axes {
     /// To the right.
-    pub x: Scale,
+    pub x: AxisScale,
     /// Upwards.
-    pub y: Scale,
+    pub y: AxisScale,
 }
 
 /// Space for labels around a chart: left, right, top, bottom.
-pub const MARGIN: [f64; 4] = [50.0, 8.0, 8.0, 34.0];
+pub(crate) const MARGIN: [f64; 4] = [50.0, 8.0, 8.0, 34.0];
 
 impl Axes {
     /// Where the point (x, y) lies.
-    pub fn at(&self, x: f64, y: f64) -> Option<(f64, f64)> {
+    pub(crate) fn at(&self, x: f64, y: f64) -> Option<(f64, f64)> {
         Some((self.x.at(x)?, self.y.at(y)?))
     }
 
     /// Left, top, width and height of the inside.
-    pub fn inside(&self) -> [f64; 4] {
+    pub(crate) fn inside(&self) -> [f64; 4] {
         let ((left, right), (bottom, top)) = (self.x.to, self.y.to);
         [left, top, right - left, bottom - top]
     }
 
     /// Grid lines, tick labels and axis names.
-    pub fn grid(&self, x_name: &str, y_name: &str, ticks: (usize, usize)) -> Markup {
+    pub(crate) fn grid(&self, x_name: &str, y_name: &str, ticks: (usize, usize)) -> Markup {
         let [left, top, width, height] = self.inside();
         let (right, bottom) = (left + width, top + height);
         html! {
@@ -141,7 +141,7 @@ impl Axes {
 }
 
 /// A path through points in SVG units that starts anew after each gap; lone points become short dashes.
-pub fn path(points: impl IntoIterator<Item = Option<(f64, f64)>>) -> String {
+pub(crate) fn path(points: impl IntoIterator<Item = Option<(f64, f64)>>) -> String {
     let (mut d, mut pen) = (String::new(), false);
     let mut lone = None;
     let dash = |d: &mut String, lone: Option<(f64, f64)>| {
@@ -166,7 +166,7 @@ pub fn path(points: impl IntoIterator<Item = Option<(f64, f64)>>) -> String {
 }
 
 /// The area between two curves (x, low, high) in SVG units, in pieces between gaps.
-pub fn band(points: &[Option<(f64, f64, f64)>]) -> String {
+pub(crate) fn band(points: &[Option<(f64, f64, f64)>]) -> String {
     let mut d = String::new();
     for piece in points.split(Option::is_none) {
         let piece: Vec<_> = piece.iter().flatten().collect();
@@ -187,7 +187,7 @@ pub fn band(points: &[Option<(f64, f64, f64)>]) -> String {
 }
 
 /// Least and greatest of the finite values.
-pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+pub(crate) fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values.into_iter().filter(|v| v.is_finite()).fold(None, |range, v| match range {
         None => Some((v, v)),
         Some((lo, hi)) => Some((v.min(lo), v.max(hi))),
@@ -200,17 +200,17 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        let labels = |scale: Scale, n| scale.ticks(n).into_iter().map(|(_, l)| l).collect::<Vec<_>>();
+        let labels = |scale: AxisScale, n| scale.ticks(n).into_iter().map(|(_, l)| l).collect::<Vec<_>>();
         assert_eq!(
-            labels(Scale::linear((-0.2, 1.1), (0.0, 1.0)), 5),
+            labels(AxisScale::linear((-0.2, 1.1), (0.0, 1.0)), 5),
             ["0.00", "0.25", "0.50", "0.75", "1.00"]
         );
-        assert_eq!(labels(Scale::linear((-3.0, 3.0), (0.0, 1.0)), 3), ["−2", "0", "2"]);
-        assert_eq!(labels(Scale::log((0.4, 30.0), (0.0, 1.0)), 6), ["0.5", "1", "2", "5", "10", "20"]);
+        assert_eq!(labels(AxisScale::linear((-3.0, 3.0), (0.0, 1.0)), 3), ["−2", "0", "2"]);
+        assert_eq!(labels(AxisScale::log((0.4, 30.0), (0.0, 1.0)), 6), ["0.5", "1", "2", "5", "10", "20"]);
         for range in
             [(f64::NAN, 1.0), (2.0, 2.0), (5.0, -5.0), (-1e308, 1e308), (0.0, f64::INFINITY), (1e300, 1e300)]
         {
-            for scale in [Scale::linear(range, (0.0, 100.0)), Scale::log(range, (0.0, 100.0))] {
+            for scale in [AxisScale::linear(range, (0.0, 100.0)), AxisScale::log(range, (0.0, 100.0))] {
                 assert!(scale.ticks(5).len() < 60);
                 for value in [0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308] {
                     assert!(scale.at(value).is_none_or(|at| at.abs() <= 400.0), "{range:?} {value}");

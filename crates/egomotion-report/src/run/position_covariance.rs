@@ -3,12 +3,12 @@
 use egomotion::geometry::{RigidMotion, Twist};
 use nalgebra::{Matrix3, Matrix6};
 
-use super::Report;
+use super::report::Report;
 
 /// Covariance of the position in m² at every pose, added up from those of φ; `None` from where it is unknown.
 ///
 /// With T' = T exp(φ)⁻¹ and φ = φ̂ + δ the error of the pose, seen from the world, grows by −Ad(T') J δ.
-pub fn covariances(report: &Report<'_>) -> Vec<Option<Matrix3<f64>>> {
+pub(crate) fn covariances(report: &Report<'_>) -> Vec<Option<Matrix3<f64>>> {
     let mut sum = Some(Matrix6::<f64>::zeros());
     let mut answered_s = None;
     let mut all: Vec<Option<Matrix3<f64>>> = Vec::new();
@@ -46,7 +46,7 @@ fn adjoint(pose: &RigidMotion) -> Matrix6<f64> {
 pub mod tests {
     use nalgebra::Vector6;
 
-    use super::super::Album;
+    use super::super::album::Album;
     use super::super::tests::{Run, motion};
     use super::*;
 

@@ -7,7 +7,7 @@ use crate::chart::document::document;
 
 /// One scene of a set.
 #[derive(Debug, Clone)]
-pub struct Scene {
+pub struct SceneSummary {
     /// Its name, which is its folder's too.
     pub name: String,
     /// Number of frames.
@@ -21,7 +21,7 @@ pub struct Scene {
 }
 
 /// The index as one HTML document that loads nothing.
-pub fn render(source: &str, command: &str, complete: bool, scenes: &[Scene]) -> String {
+pub fn render(source: &str, command: &str, complete: bool, scenes: &[SceneSummary]) -> String {
     let body = html! {
         header {
             p class="kicker" { "egomotion · a set of scenes" }

@@ -4,51 +4,55 @@ use egomotion::geometry::RigidMotion;
 use maud::{Markup, html};
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
-use super::series::{Series, Timeline};
-use super::{Interval, Report, position};
+use super::interval::Interval;
+use super::position_covariance;
+use super::report::Report;
+use super::time_series::TimeSeries;
+use super::timeline::Timeline;
+use crate::chart::axes::{Axes, AxisScale, MARGIN, extent, path};
 use crate::chart::number::{Unit, length};
-use crate::chart::plot::{Axes, MARGIN, Scale, extent, path};
 
-/// Width of the chart, in SVG units.
+/// Width of the chart, in SVG units, which are pixels on a phone.
 const WIDTH: f64 = 400.0;
-/// Least and greatest height.
-const HEIGHTS: (f64, f64) = (250.0, 400.0);
-/// About so many ellipses along the path.
-const ELLIPSES: usize = 10;
-/// Most points of a line.
-const MOST_POINTS: usize = 3000;
+/// Least and greatest height of the chart, in SVG units: a straight path still has room for its labels, and a long one
+/// fits on a screen.
+const HEIGHT_RANGE: (f64, f64) = (250.0, 400.0);
+/// About so many ellipses along the path: with more they cover each other.
+const ELLIPSE_COUNT: usize = 10;
+/// Most points of the path, several a pixel of its chart: more make the page larger alone.
+const MAX_PATH_POINTS: usize = 3000;
 /// 95 % quantile of χ² with two degrees of freedom.
 const CHI2_95: f64 = 5.991_464_547_107_979;
 
 /// Where the camera was, and how sure that is, at every row.
-pub struct Path<'a> {
+pub(crate) struct CameraPath<'a> {
     poses: &'a [RigidMotion],
     truth: Vec<RigidMotion>,
     covariances: Vec<Option<Matrix3<f64>>>,
 }
 
-impl<'a> Path<'a> {
+impl<'a> CameraPath<'a> {
     /// The path of a run.
-    pub fn of(report: &Report<'a>) -> Self {
+    pub(crate) fn of(report: &Report<'a>) -> Self {
         Self {
             poses: report.poses,
             truth: report.truth.map(|truth| aligned(truth, report.poses)).unwrap_or_default(),
-            covariances: position::covariances(report),
+            covariances: position_covariance::covariances(report),
         }
     }
 
     /// Half of the longest axis of the last position's 95 % ellipse seen from above, in metres.
-    pub fn end_within_m(&self) -> Option<f64> {
+    pub(crate) fn end_within_m(&self) -> Option<f64> {
         let [(long, _), _] = half_axes(&from_above((*self.covariances.last()?)?))?;
         Some(long)
     }
 
     /// The view from above.
-    pub fn chart(&self, report: &Report<'_>) -> Markup {
+    pub(crate) fn chart(&self, report: &Report<'_>) -> Markup {
         let axes = equal_axes(self.poses, &self.truth);
-        let height = axes.y.at(axes.y.range().0).unwrap_or(HEIGHTS.0) + MARGIN[3];
+        let height = axes.y.at(axes.y.range().0).unwrap_or(HEIGHT_RANGE.0) + MARGIN[3];
         let place = |pose: &RigidMotion| axes.at(pose.translation.x, pose.translation.z);
-        let few = self.poses.len().div_ceil(MOST_POINTS).max(1);
+        let few = self.poses.len().div_ceil(MAX_PATH_POINTS).max(1);
         let thinned = |poses: &'_ [RigidMotion]| -> String {
             path(poses.iter().step_by(few).chain(poses.last()).map(place))
         };
@@ -57,7 +61,7 @@ impl<'a> Path<'a> {
             Ellipse::new(place(self.poses.get(k)?)?, &cov, pixels_per_metre(&axes))
         };
         let ellipses: Vec<Ellipse> =
-            spaced(self.poses.len(), ELLIPSES).filter_map(ellipse).filter(|e| e.radii.0 > 1.2).collect();
+            spaced(self.poses.len(), ELLIPSE_COUNT).filter_map(ellipse).filter(|e| e.radii.0 > 1.2).collect();
         let ends = [self.poses.first().zip(Some("start")), self.poses.last().zip(Some("end"))];
         html! {
             svg viewBox=(format!("0 0 {WIDTH} {height:.1}")) role="img" aria-label="path of the camera from above" {
@@ -78,7 +82,7 @@ impl<'a> Path<'a> {
     }
 
     /// Height above the start over time.
-    pub fn height(&self, report: &Report<'_>, timeline: &Timeline<'_>) -> Series {
+    pub(crate) fn height(&self, report: &Report<'_>, timeline: &Timeline<'_>) -> TimeSeries {
         let all = self.poses.iter().chain(&self.truth);
         let unit: Unit =
             length(all.map(|p| p.translation.y.abs()).filter(|y| y.is_finite()).fold(0.0, f64::max));
@@ -92,7 +96,7 @@ impl<'a> Path<'a> {
         let truth =
             |k: usize| Some(-self.truth.get(k)?.translation.y * unit.factor).filter(|y| y.is_finite());
         let rows = || (0..report.frames.len()).step_by(step);
-        Series {
+        TimeSeries {
             id: "height".into(),
             name: "Height above the start".into(),
             unit: unit.name.into(),
@@ -110,9 +114,9 @@ impl<'a> Path<'a> {
             angle.is_finite().then(|| format!("{x:.1} {y:.1} {angle:.1}"))
         };
         let at: Vec<String> = report
-            .stops()
+            .slider_positions()
             .iter()
-            .map(|stop| self.poses.get(stop.row).and_then(transform))
+            .map(|position| self.poses.get(position.row).and_then(transform))
             .map(|at| at.unwrap_or_else(|| "-99 0 0".into()))
             .collect();
         html! {
@@ -156,15 +160,16 @@ fn equal_axes(poses: &[RigidMotion], truth: &[RigidMotion]) -> Axes {
     let (wide, high) = (x.1 - x.0 + 2.0 * room, z.1 - z.0 + 2.0 * room);
     let inside = WIDTH - MARGIN[0] - MARGIN[1];
     let top = MARGIN[2] + 14.0;
-    let tall = (inside * high / wide).clamp(HEIGHTS.0 - top - MARGIN[3], HEIGHTS.1 - top - MARGIN[3]);
+    let tall =
+        (inside * high / wide).clamp(HEIGHT_RANGE.0 - top - MARGIN[3], HEIGHT_RANGE.1 - top - MARGIN[3]);
     let metres_per_px = (wide / inside).max(high / tall);
     let around = |(lo, hi): (f64, f64), px: f64| {
         let (middle, half) = (0.5 * (lo + hi), 0.5 * px * metres_per_px);
         (middle - half, middle + half)
     };
     Axes {
-        x: Scale::linear(around(x, inside), (MARGIN[0], MARGIN[0] + inside)),
-        y: Scale::linear(around(z, tall), (top + tall, top)),
+        x: AxisScale::linear(around(x, inside), (MARGIN[0], MARGIN[0] + inside)),
+        y: AxisScale::linear(around(z, tall), (top + tall, top)),
     }
 }
 
@@ -222,7 +227,7 @@ mod tests {
     use egomotion::geometry::Twist;
     use nalgebra::Vector6;
 
-    use super::super::position::tests::poses;
+    use super::super::position_covariance::tests::poses;
     use super::*;
 
     #[test]

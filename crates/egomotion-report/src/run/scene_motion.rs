@@ -3,9 +3,11 @@
 use egomotion::geometry::Twist;
 use maud::{Markup, html};
 
-use super::charts::{self, LOW, SMALL};
-use super::series::{Series, Timeline};
-use super::{FrameRow, Interval};
+use super::charts::{self, COMPONENT_CHART_SIZE, ERROR_CHART_SIZE};
+use super::interval::Interval;
+use super::report::FrameRow;
+use super::time_series::TimeSeries;
+use super::timeline::Timeline;
 use crate::chart::number::{DEGREES, Unit, length, significant};
 
 /// The components of φ and what a positive value means.
@@ -19,7 +21,7 @@ const COMPONENTS: [(&str, &str, &str); 6] = [
 ];
 
 /// The six components over time.
-pub fn series(timeline: &Timeline<'_>) -> Vec<Series> {
+pub(crate) fn series(timeline: &Timeline<'_>) -> Vec<TimeSeries> {
     let shifts = timeline.rows.iter().flat_map(|row| (0..3).filter_map(|i| row.component(i)));
     let metres = length(shifts.map(|(v, _)| v.abs()).fold(0.0, f64::max));
     let one = |(i, (symbol, axis, _)): (usize, (&str, &str, &str))| {
@@ -28,7 +30,7 @@ pub fn series(timeline: &Timeline<'_>) -> Vec<Series> {
             row.component(i).map(|(v, s)| Interval::around(v * unit.factor, s * unit.factor))
         };
         let truth = |row: &&FrameRow| Some(Twist::vector(&row.truth?)[i] * unit.factor);
-        Series {
+        TimeSeries {
             id: format!("phi-{i}"),
             name: format!("{symbol}{axis}"),
             unit: unit.name.to_owned(),
@@ -40,7 +42,7 @@ pub fn series(timeline: &Timeline<'_>) -> Vec<Series> {
 }
 
 /// The six charts; `errors` below them where there is truth.
-pub fn charts(timeline: &Timeline<'_>, all: &[Series]) -> Markup {
+pub(crate) fn charts(timeline: &Timeline<'_>, all: &[TimeSeries]) -> Markup {
     html! {
         div class="charts" {
             @for ((symbol, axis, sign), series) in COMPONENTS.into_iter().zip(all) {
@@ -52,10 +54,10 @@ pub fn charts(timeline: &Timeline<'_>, all: &[Series]) -> Markup {
                             @if series.usual_band().is_finite() { "; known to ±" (significant(series.usual_band(), 2)) " " (series.unit) }
                         }
                     }
-                    (charts::chart(timeline, series, &charts::axes(timeline, charts::value_range(series), SMALL), SMALL))
+                    (charts::chart(timeline, series, &charts::axes(timeline, charts::value_range(series), COMPONENT_CHART_SIZE), COMPONENT_CHART_SIZE))
                     @if let Some(errors) = series.errors() {
                         span class="sign" { "estimate − truth, against the same band" }
-                        (charts::chart(timeline, &errors, &charts::axes(timeline, charts::error_range(&errors), LOW), LOW))
+                        (charts::chart(timeline, &errors, &charts::axes(timeline, charts::error_range(&errors), ERROR_CHART_SIZE), ERROR_CHART_SIZE))
                     }
                 }
             }
