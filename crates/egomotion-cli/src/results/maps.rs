@@ -1,38 +1,43 @@
-//! The maps of a frame pair as files: for programs, for eyes, and as a cloud of points.
+//! The maps of a frame pair as files: for programs, to look at, and as a cloud of points.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use egomotion::geometry::{Field, Grid, StereoRig};
-use egomotion::metrics::quantile;
 use egomotion::motion::TimeToImpact;
 use egomotion::observe::DisparityMap;
-use egomotion::pipeline::maps::MotionMaps;
 use egomotion::pipeline::stereo::DenseResults;
-use egomotion_io::ply::{self, CloudPoint};
 use egomotion_io::{disparity_png, flo, flow_png, image, npy, pfm, write};
-use nalgebra::Vector3;
+use egomotion_report::chart::colour::{
+    CIVIDIS, ColourMap, ColourScaling, DIVERGING, INFERNO_REVERSED, VIRIDIS,
+};
 
-use crate::args::{CloudArg, MapFormat};
-use egomotion_report::chart::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Spread, VIRIDIS};
+pub use super::cloud::CloudQuantity;
+use super::cloud::write_cloud;
+use super::colours::{ColourRange, flow_colours};
+
+/// A format of maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MapFormat {
+    /// PFM, flow as .flo.
+    Pfm,
+    /// NumPy arrays of single precision.
+    Npy,
+    /// KITTI's 16-bit PNG, of disparity and flow alone.
+    Kitti,
+    /// PNG in colours, to look at.
+    Colour,
+}
 
 /// Which files are written of each frame pair.
 #[derive(Debug, Clone, Default)]
 pub struct MapFiles {
     pub formats: Vec<MapFormat>,
-    pub cloud: Option<CloudArg>,
-}
-
-/// A map and how it is shown.
-struct Shown<'a> {
-    folder: &'static str,
-    plane: &'a Grid<f32>,
-    colours: ColourMap,
-    spread: Spread,
+    pub cloud: Option<CloudQuantity>,
 }
 
 /// The folders of maps.
-const FOLDERS: [&str; 8] = [
+const MAP_FOLDERS: [&str; 8] = [
     "disparity",
     "disparity_sigma",
     "flow",
@@ -43,6 +48,9 @@ const FOLDERS: [&str; 8] = [
     "impact_hi",
 ];
 
+/// The folder of clouds.
+const CLOUD_FOLDER: &str = "cloud";
+
 impl MapFiles {
     /// Whether anything is written.
     pub fn any(&self) -> bool {
@@ -51,8 +59,8 @@ impl MapFiles {
 
     /// Make the folders in `out`.
     pub fn folders(&self, out: &Path) -> Result<()> {
-        let maps = FOLDERS.into_iter().filter(|_| !self.formats.is_empty());
-        for name in maps.chain(self.cloud.map(|_| "cloud")) {
+        let maps = MAP_FOLDERS.into_iter().filter(|_| !self.formats.is_empty());
+        for name in maps.chain(self.cloud.map(|_| CLOUD_FOLDER)) {
             write::folder(&out.join(name))?;
         }
         Ok(())
@@ -60,79 +68,108 @@ impl MapFiles {
 
     /// Remove what a killed run left half written in those folders.
     pub fn sweep(&self, out: &Path) -> Result<()> {
-        for name in FOLDERS.into_iter().chain(["cloud"]) {
+        for name in MAP_FOLDERS.into_iter().chain([CLOUD_FOLDER]) {
             write::sweep(&out.join(name))?;
-        }
-        Ok(())
-    }
-
-    /// Write disparity alone.
-    pub fn write_disparity(&self, out: &Path, index: usize, map: &DisparityMap) -> Result<()> {
-        for shown in [
-            Shown { folder: "disparity", plane: map.shift.grid(), colours: VIRIDIS, spread: Spread::Linear },
-            Shown {
-                folder: "disparity_sigma",
-                plane: map.sigma.grid(),
-                colours: CIVIDIS,
-                spread: Spread::Logarithmic,
-            },
-        ] {
-            write::folder(&out.join(shown.folder))?;
-            let file = |ending: &str| out.join(shown.folder).join(format!("{index:06}.{ending}"));
-            for format in &self.formats {
-                shown.write(*format, &file)?;
-            }
         }
         Ok(())
     }
 
     /// Write the maps of the frame pair whose earlier frame has `index` in the source.
     pub fn write(&self, out: &Path, index: usize, dense: &DenseResults, rig: &StereoRig) -> Result<()> {
-        let motion = &dense.motion;
-        let interval = |impact: &TimeToImpact| impact.interval95_s();
-        let file = |folder: &str, ending: &str| out.join(folder).join(format!("{index:06}.{ending}"));
         if !self.formats.is_empty() {
-            let shown = |folder, plane, colours, spread| Shown { folder, plane, colours, spread };
-            for map in [
-                shown("disparity", dense.disparity.shift.grid(), VIRIDIS, Spread::Linear),
-                shown("disparity_sigma", dense.disparity.sigma.grid(), CIVIDIS, Spread::Logarithmic),
-                shown("depth_velocity", motion.depth_velocity.grid(), DIVERGING, Spread::Symmetric),
-                shown(
-                    "depth_velocity_sigma",
-                    motion.depth_velocity_sigma.grid(),
-                    CIVIDIS,
-                    Spread::Logarithmic,
-                ),
-                shown("impact", &motion.seconds(TimeToImpact::seconds), EMBER, Spread::Logarithmic),
-                shown(
-                    "impact_lo",
-                    &motion.seconds(|impact| Some(interval(impact)?.0)),
-                    EMBER,
-                    Spread::Logarithmic,
-                ),
-                shown(
-                    "impact_hi",
-                    &motion.seconds(|impact| Some(interval(impact)?.1)),
-                    EMBER,
-                    Spread::Logarithmic,
-                ),
-            ] {
-                for format in &self.formats {
-                    map.write(*format, &|ending| file(map.folder, ending))?;
-                }
+            let impact = ImpactPlanes::of(dense);
+            let disparity = disparity_maps(&dense.disparity);
+            for map in disparity.into_iter().chain(motion_maps(dense, &impact)) {
+                map.write_all(&self.formats, out, index)?;
             }
             for format in &self.formats {
-                write_flow(*format, [&dense.flow.u, &dense.flow.v], &|ending| file("flow", ending))?;
+                write_flow(*format, [&dense.flow.u, &dense.flow.v], &|ending| {
+                    map_file(out, "flow", index, ending)
+                })?;
             }
         }
         match self.cloud {
             None => Ok(()),
-            Some(quantity) => cloud(&file("cloud", "ply"), quantity, dense, rig),
+            Some(quantity) => write_cloud(&map_file(out, CLOUD_FOLDER, index, "ply"), quantity, dense, rig),
         }
     }
 }
 
-impl Shown<'_> {
+/// Write the disparity of a pair and its σ, with the folders that they need.
+pub fn write_disparity(formats: &[MapFormat], out: &Path, index: usize, map: &DisparityMap) -> Result<()> {
+    for map in disparity_maps(map) {
+        write::folder(&out.join(map.folder))?;
+        map.write_all(formats, out, index)?;
+    }
+    Ok(())
+}
+
+fn map_file(out: &Path, folder: &str, index: usize, ending: &str) -> PathBuf {
+    out.join(folder).join(format!("{index:06}.{ending}"))
+}
+
+/// A map and how it is coloured.
+struct ShownMap<'a> {
+    folder: &'static str,
+    plane: &'a Grid<f32>,
+    colours: ColourMap,
+    scaling: ColourScaling,
+}
+
+fn shown<'a>(
+    folder: &'static str,
+    plane: &'a Grid<f32>,
+    colours: ColourMap,
+    scaling: ColourScaling,
+) -> ShownMap<'a> {
+    ShownMap { folder, plane, colours, scaling }
+}
+
+fn disparity_maps(map: &DisparityMap) -> [ShownMap<'_>; 2] {
+    [
+        shown("disparity", map.shift.grid(), VIRIDIS, ColourScaling::Linear),
+        shown("disparity_sigma", map.sigma.grid(), CIVIDIS, ColourScaling::Logarithmic),
+    ]
+}
+
+/// Time to impact of every pixel with both ends of its 95 % interval, in seconds.
+struct ImpactPlanes {
+    seconds: Grid<f32>,
+    low: Grid<f32>,
+    high: Grid<f32>,
+}
+
+impl ImpactPlanes {
+    fn of(dense: &DenseResults) -> Self {
+        let motion = &dense.motion;
+        let interval = |impact: &TimeToImpact| impact.interval95_s();
+        Self {
+            seconds: motion.seconds(TimeToImpact::seconds),
+            low: motion.seconds(|impact| Some(interval(impact)?.0)),
+            high: motion.seconds(|impact| Some(interval(impact)?.1)),
+        }
+    }
+}
+
+fn motion_maps<'a>(dense: &'a DenseResults, impact: &'a ImpactPlanes) -> [ShownMap<'a>; 5] {
+    let motion = &dense.motion;
+    let sigma = motion.depth_velocity_sigma.grid();
+    [
+        shown("depth_velocity", motion.depth_velocity.grid(), DIVERGING, ColourScaling::Symmetric),
+        shown("depth_velocity_sigma", sigma, CIVIDIS, ColourScaling::Logarithmic),
+        shown("impact", &impact.seconds, INFERNO_REVERSED, ColourScaling::Logarithmic),
+        shown("impact_lo", &impact.low, INFERNO_REVERSED, ColourScaling::Logarithmic),
+        shown("impact_hi", &impact.high, INFERNO_REVERSED, ColourScaling::Logarithmic),
+    ]
+}
+
+impl ShownMap<'_> {
+    fn write_all(&self, formats: &[MapFormat], out: &Path, index: usize) -> Result<()> {
+        formats
+            .iter()
+            .try_for_each(|format| self.write(*format, &|ending| map_file(out, self.folder, index, ending)))
+    }
+
     fn write(&self, format: MapFormat, file: &dyn Fn(&str) -> PathBuf) -> Result<()> {
         match format {
             MapFormat::Pfm => pfm::write(&file("pfm"), self.plane)?,
@@ -149,34 +186,10 @@ impl Shown<'_> {
 
     /// Missing pixels are black; a hundredth of the values at either end has the colour of the end.
     fn coloured(&self) -> Grid<[u8; 3]> {
-        let scale = Scale::of(self.plane.values(), self.spread);
+        let range = ColourRange::of(self.plane.values(), self.scaling);
         let (width, height) = self.plane.size();
-        let colour = |u, v| scale.as_ref().and_then(|scale| scale.colour(self.plane.at(u, v), self.colours));
+        let colour = |u, v| range.as_ref().and_then(|range| range.colour(self.plane.at(u, v), self.colours));
         Grid::from_fn(width, height, |u, v| colour(u, v).unwrap_or_default())
-    }
-}
-
-/// Colours over the range that holds nearly all values.
-struct Scale {
-    spread: Spread,
-    ends: (f64, f64),
-}
-
-impl Scale {
-    fn of(values: &[f32], spread: Spread) -> Option<Self> {
-        let known = values.iter().map(|&v| spread.coordinate(f64::from(v))).filter(|v| v.is_finite());
-        let known: Vec<f64> = known.collect();
-        let (low, high) = (quantile(&known, 0.01)?, quantile(&known, 0.99)?);
-        let most = low.abs().max(high.abs());
-        let ends = if spread == Spread::Symmetric { (-most, most) } else { (low, high) };
-        Some(Self { spread, ends })
-    }
-
-    /// `None` for what is missing.
-    fn colour(&self, value: f32, colours: ColourMap) -> Option<[u8; 3]> {
-        let at = Some(self.spread.coordinate(f64::from(value))).filter(|at| !at.is_nan())?;
-        let width = (self.ends.1 - self.ends.0).max(f64::MIN_POSITIVE);
-        Some(colours.at((at - self.ends.0) / width))
     }
 }
 
@@ -189,62 +202,4 @@ fn write_flow(format: MapFormat, flow: [&Field; 2], file: &dyn Fn(&str) -> PathB
         MapFormat::Colour => image::write_rgb(&file("colour.png"), &flow_colours(flow))?,
     }
     Ok(())
-}
-
-/// Direction as hue, length as saturation up to the 99th percentile; missing is black.
-fn flow_colours([u, v]: [&Field; 2]) -> Grid<[u8; 3]> {
-    let (width, height) = u.size();
-    let at = |x, y| Some((f64::from(u.get(x, y)?), f64::from(v.get(x, y)?)));
-    let lengths: Vec<f64> =
-        (0..height).flat_map(|y| (0..width).filter_map(move |x| at(x, y))).map(|(a, b)| a.hypot(b)).collect();
-    let longest = quantile(&lengths, 0.99).unwrap_or(1.0).max(f64::MIN_POSITIVE);
-    let colour = |(a, b): (f64, f64)| {
-        let saturation = (a.hypot(b) / longest).min(1.0);
-        let turn = b.atan2(a);
-        std::array::from_fn(|k| {
-            let wave = 0.5 + 0.5 * (turn - std::f64::consts::TAU * k as f64 / 3.0).cos();
-            (255.0 * (1.0 - saturation * (1.0 - wave))) as u8
-        })
-    };
-    Grid::from_fn(width, height, |x, y| at(x, y).map(colour).unwrap_or_default())
-}
-
-/// Every pixel with depth and an answer as a point, coloured by the quantity.
-fn cloud(path: &Path, quantity: CloudArg, dense: &DenseResults, rig: &StereoRig) -> Result<()> {
-    let motion = &dense.motion;
-    let seconds = motion.seconds(TimeToImpact::seconds);
-    let (values, colours, spread) = match quantity {
-        CloudArg::Vz => (motion.depth_velocity.grid(), DIVERGING, Spread::Symmetric),
-        CloudArg::Impact => (&seconds, EMBER, Spread::Logarithmic),
-    };
-    let Some(scale) = Scale::of(values.values(), spread) else {
-        return Ok(ply::write(path, quantity.name(), &[])?);
-    };
-    let (width, height) = values.size();
-    let point = |u: usize, v: usize| {
-        let shift = f64::from(dense.disparity.shift.get(u, v)?);
-        let (x, y) = rig.image_from_pixel(u as f64, v as f64);
-        let position = rig.point(&Vector3::new(x, y, rig.disparity_from_shift(shift)))?;
-        let value = values.at(u, v);
-        Some(CloudPoint {
-            position_m: [position.x as f32, position.y as f32, position.z as f32],
-            colour: scale.colour(value, colours)?,
-            value,
-            sigma: sigma(quantity, motion, u, v)?,
-        })
-    };
-    let points: Vec<CloudPoint> =
-        (0..height).flat_map(|v| (0..width).filter_map(move |u| point(u, v))).collect();
-    Ok(ply::write(path, quantity.name(), &points)?)
-}
-
-/// σ of a pixel's quantity; that of time to impact to first order.
-fn sigma(quantity: CloudArg, motion: &MotionMaps, u: usize, v: usize) -> Option<f32> {
-    match quantity {
-        CloudArg::Vz => motion.depth_velocity_sigma.get(u, v),
-        CloudArg::Impact => {
-            let seconds = motion.impact(u, v)?.seconds()? as f32;
-            Some(motion.looming_sigma.get(u, v)? * seconds * seconds)
-        }
-    }
 }

@@ -3,8 +3,9 @@
 use anyhow::Result;
 use egomotion::pipeline::MovingGroup;
 
-use crate::session::Row;
+use crate::session::FrameResult;
 
+/// The columns: where the group is, its φ (metres, radians) with σ, VZ in metres a frame, and time to impact.
 const COLUMNS: [&str; 25] = [
     "frame",
     "group",
@@ -34,12 +35,12 @@ const COLUMNS: [&str; 25] = [
 ];
 
 /// The table; what is not known is empty.
-pub fn table(rows: &[Row]) -> Result<String> {
+pub fn table(frames: &[FrameResult]) -> Result<String> {
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(COLUMNS)?;
-    for row in rows {
-        for (number, group) in row.motion.moving.iter().enumerate() {
-            table.write_record(record(row.index, number, group))?;
+    for frame in frames {
+        for (number, group) in frame.motion.moving.iter().enumerate() {
+            table.write_record(record(frame.index, number, group))?;
         }
     }
     let bytes = table.into_inner().map_err(|e| e.into_error())?;
@@ -67,10 +68,10 @@ fn record(frame: usize, number: usize, group: &MovingGroup) -> Vec<String> {
 }
 
 /// One sentence for the report; `None` if nothing moved.
-pub fn note(rows: &[Row]) -> Option<String> {
-    let frames = rows.iter().filter(|row| !row.motion.moving.is_empty()).count();
-    let groups: usize = rows.iter().map(|row| row.motion.moving.len()).sum();
+pub fn note(frames: &[FrameResult]) -> Option<String> {
+    let moving = frames.iter().filter(|frame| !frame.motion.moving.is_empty()).count();
+    let groups: usize = frames.iter().map(|frame| frame.motion.moving.len()).sum();
     (groups > 0).then(|| {
-        format!("Things moved by themselves in {frames} of {} frames, {groups} in all: moving.csv lists them, each with its own motion.", rows.len())
+        format!("Things moved by themselves in {moving} of {} frames, {groups} in all: moving.csv lists them, each with its own motion.", frames.len())
     })
 }

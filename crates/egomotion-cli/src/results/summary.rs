@@ -1,18 +1,29 @@
 //! `summary.json`: what was run, how it went, and where the time was spent.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use egomotion::geometry::{StereoRectification, StereoRig};
 use egomotion::pipeline::Config;
 use egomotion_io::source::{DepthSensor, Sequence};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 
-use crate::judge::{MapVerdict, MotionVerdict};
-use crate::results::status;
+use super::motion::status;
+use super::verdict::{MapVerdict, MotionVerdict};
 use crate::session::Outcome;
 
+/// Median disagreement of rows in pixels above which the user is warned: it then shows in every depth.
+const WARNED_ROW_DISAGREEMENT_PX: f64 = 0.25;
+
+/// Number of rows by their `status`.
+pub type StatusCounts = BTreeMap<String, usize>;
+
+/// Whether any row gives a motion, or part of one.
+pub fn has_answers(counts: &StatusCounts) -> bool {
+    counts.contains_key("ok") || counts.contains_key("partial")
+}
+
+/// What `summary.json` holds.
 #[derive(Serialize)]
 pub struct Summary {
     pub version: &'static str,
@@ -30,7 +41,7 @@ pub struct Summary {
     pub config: Config,
     pub seed: u64,
     /// Rows by status.
-    pub counts: BTreeMap<Word, usize>,
+    pub counts: StatusCounts,
     /// Answered intervals without an obstacle, by reason.
     pub no_obstacle: BTreeMap<&'static str, usize>,
     /// Mean milliseconds per frame.
@@ -67,24 +78,27 @@ impl Cameras {
     }
 }
 
-/// A word of ours, or one that was read.
-pub type Word = Cow<'static, str>;
-
 impl Summary {
+    /// Number of rows that give a motion, or part of one.
+    pub fn answered(&self) -> usize {
+        ["ok", "partial"].iter().filter_map(|status| self.counts.get(*status)).sum()
+    }
+
     pub fn new(source: String, rig: StereoRig, config: &Config, outcome: &Outcome) -> Self {
-        let (mut counts, mut no_obstacle) = (BTreeMap::new(), BTreeMap::new());
-        for row in outcome.rows.iter().skip(1) {
-            *counts.entry(Word::from(status(row))).or_insert(0) += 1;
-            if let (Ok(_), Err(why)) = (&row.motion.motion, &row.motion.obstacle) {
+        let (mut counts, mut no_obstacle) = (StatusCounts::new(), BTreeMap::new());
+        for frame in outcome.frames.iter().skip(1) {
+            *counts.entry(status(frame).to_owned()).or_insert(0) += 1;
+            if let (Ok(_), Err(why)) = (&frame.motion.motion, &frame.motion.obstacle) {
                 *no_obstacle.entry(why.code()).or_insert(0) += 1;
             }
         }
-        let rows: Vec<f64> = outcome.rows.iter().filter_map(|row| row.motion.row_disagreement_px).collect();
-        let row_disagreement_px = egomotion::metrics::quantile(&rows, 0.5);
+        let disagreements: Vec<f64> =
+            outcome.frames.iter().filter_map(|frame| frame.motion.row_disagreement_px).collect();
+        let row_disagreement_px = egomotion::metrics::quantile(&disagreements, 0.5);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             source,
-            frames: outcome.rows.len(),
+            frames: outcome.frames.len(),
             complete: outcome.complete,
             rig,
             cameras: None,
@@ -104,51 +118,12 @@ impl Summary {
     }
 }
 
-/// Rows that disagree by more than this show in every depth.
-const WORRYING_ROWS_PX: f64 = 0.25;
-
 /// What to say of a pair whose rows disagree.
 fn badly_rectified(rows_px: f64) -> Option<String> {
-    (rows_px > WORRYING_ROWS_PX).then(|| {
+    (rows_px > WARNED_ROW_DISAGREEMENT_PX).then(|| {
         format!(
             "Matches of left and right lie on different rows, by {rows_px:.2} px: the pair is not well rectified, \
              and depths are less certain than their noise tells. Check the calibration."
         )
     })
-}
-
-/// An index over the scenes of a set.
-#[derive(Serialize)]
-pub struct Index {
-    pub version: &'static str,
-    pub source: String,
-    /// As in [`Summary`].
-    pub options: Value,
-    pub config: Config,
-    pub complete: bool,
-    pub scenes: Vec<SceneEntry>,
-}
-
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct SceneEntry {
-    pub scene: String,
-    pub frames: usize,
-    pub counts: BTreeMap<Word, usize>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub truth_maps: Option<MapVerdict>,
-    /// Why the scene could not be run.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub error: Option<String>,
-}
-
-impl SceneEntry {
-    pub fn done(scene: &str, summary: Summary) -> Self {
-        let Summary { frames, counts, truth_maps, .. } = summary;
-        Self { scene: scene.to_owned(), frames, counts, truth_maps, error: None }
-    }
-
-    pub fn failed(scene: &str, error: &anyhow::Error) -> Self {
-        let error = Some(format!("{error:#}"));
-        Self { scene: scene.to_owned(), frames: 0, counts: BTreeMap::new(), truth_maps: None, error }
-    }
 }

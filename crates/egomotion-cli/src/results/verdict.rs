@@ -3,6 +3,7 @@
 use anyhow::Result;
 use egomotion::geometry::{Field, StereoRig};
 use egomotion::metrics::{self, Nees};
+use egomotion::observe::DisparityMap;
 use egomotion::pipeline::stereo::DenseResults;
 use egomotion_io::source::TruthMaps;
 use serde::{Deserialize, Serialize};
@@ -27,8 +28,8 @@ impl MotionVerdict {
         let errors = metrics::relative_pose_error(outcome.trajectory.poses(), outcome.truth.as_deref()?)?;
         let mut nees = Nees::default();
         let (mut inside, mut components) = (0, 0);
-        for row in &outcome.rows {
-            let (Ok(motion), Some(truth)) = (&row.motion.motion, row.truth) else { continue };
+        for frame in &outcome.frames {
+            let (Ok(motion), Some(truth)) = (&frame.motion.motion, frame.truth) else { continue };
             if !motion.is_complete() {
                 continue;
             }
@@ -64,7 +65,7 @@ pub struct MapVerdict {
 
 /// Sums over pixels that lead to a [`MapVerdict`].
 #[derive(Debug, Default)]
-pub struct MapTally {
+pub struct MapErrors {
     vz_errors: Vec<f64>,
     disparity_errors: Vec<f64>,
     within: usize,
@@ -72,7 +73,7 @@ pub struct MapTally {
     pixels: usize,
 }
 
-impl MapTally {
+impl MapErrors {
     /// Count one pixel: true shift in pixels and true VZ in metres.
     pub fn add(&mut self, dense: &DenseResults, (u, v): (usize, usize), shift_px: f64, vz_m: f64) {
         self.pixels += 1;
@@ -109,7 +110,7 @@ pub fn scene_maps(rig: &StereoRig, dense: &DenseResults, truth: &TruthMaps) -> R
     if now.size() != dense.disparity.shift.size() || next.size() != now.size() {
         return Ok(None);
     }
-    let mut tally = MapTally::default();
+    let mut tally = MapErrors::default();
     for v in 0..now.height() {
         for u in 0..now.width() {
             let (Some(a), Some(b)) = (now.get(u, v), next.get(u, v)) else { continue };
@@ -120,4 +121,48 @@ pub fn scene_maps(rig: &StereoRig, dense: &DenseResults, truth: &TruthMaps) -> R
         }
     }
     Ok(tally.verdict())
+}
+
+/// Disparity against the true one, over the pixels that have a truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DisparityVerdict {
+    /// Share of them with an answer.
+    pub answered: f64,
+    /// Share off by more than 1 px, or without an answer.
+    pub bad_1px: f64,
+    /// The same with 3 px.
+    pub bad_3px: f64,
+    pub median_abs_error_px: f64,
+    /// Share of the answers within 2σ of the truth.
+    pub within_2_sigma: f64,
+    pub pixels: usize,
+}
+
+impl DisparityVerdict {
+    /// `None` where the sizes differ or nothing has both a truth and an answer.
+    pub fn of(map: &DisparityMap, truth: &Field) -> Option<Self> {
+        if truth.size() != map.shift.size() {
+            return None;
+        }
+        let (mut errors, mut within, mut pixels) = (Vec::new(), 0, 0);
+        let (width, height) = truth.size();
+        for (u, v) in (0..height).flat_map(|v| (0..width).map(move |u| (u, v))) {
+            let Some(truth) = truth.get(u, v) else { continue };
+            pixels += 1;
+            let (Some(found), Some(sigma)) = (map.shift.get(u, v), map.sigma.get(u, v)) else { continue };
+            let error = f64::from((found - truth).abs());
+            within += usize::from(error <= 2.0 * f64::from(sigma));
+            errors.push(error);
+        }
+        let share = |count: usize| count as f64 / pixels.max(1) as f64;
+        let good = |limit: f64| errors.iter().filter(|&&error| error <= limit).count();
+        Some(Self {
+            answered: share(errors.len()),
+            bad_1px: 1.0 - share(good(1.0)),
+            bad_3px: 1.0 - share(good(3.0)),
+            median_abs_error_px: metrics::quantile(&errors, 0.5)?,
+            within_2_sigma: within as f64 / errors.len() as f64,
+            pixels,
+        })
+    }
 }

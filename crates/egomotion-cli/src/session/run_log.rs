@@ -1,19 +1,22 @@
 //! What is done of a run, on the disk as it goes on, so that a stopped or killed run can go on from there.
 //!
 //! A journal whose parts are stretches of frames, each ending with what the pipeline then kept. A stretch is a
-//! tenth of the run so far, and no longer than [`LONGEST_MS`]: that much work is lost at most.
+//! tenth of the run so far, and no longer than [`MAX_STRETCH_MS`]: that much work is lost at most.
 
 use anyhow::Result;
 use egomotion::geometry::RigidMotion;
 use egomotion_io::recording::Memory;
+use egomotion_report::run::FramePictures;
 use serde::{Deserialize, Serialize};
 
-use super::Row;
+use super::outcome::FrameResult;
 use crate::journal::{Journal, Parts};
-use egomotion_report::run::FramePictures;
 
-/// Longest time between two writes, in milliseconds.
-const LONGEST_MS: f64 = 1e4;
+/// Longest time between two writes, in milliseconds: a kill loses no more work than that.
+const MAX_STRETCH_MS: f64 = 1e4;
+/// Share of the run so far after which it is written again. With a larger one a kill loses more work; with a smaller one
+/// the journal grows, because every stretch carries what the pipeline keeps.
+const STRETCH_SHARE: f64 = 0.1;
 
 /// Frames that were done without a break in between.
 #[derive(Debug, Serialize, Deserialize)]
@@ -29,24 +32,26 @@ pub struct Stretch {
 /// One frame that is done.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct DoneFrame {
-    pub row: Row,
+    pub row: FrameResult,
     /// True pose world_from_camera.
     pub pose: Option<RigidMotion>,
     /// Size of its files: a recording that was changed since is noticed by it.
     pub bytes: u64,
     pub(super) decode_ms: f64,
-    pub(super) picture: Picture,
+    pub(super) picture: AlbumOffer,
 }
 
 /// What a frame gave to the report's album.
 #[derive(Debug, Serialize, Deserialize)]
-pub enum Picture {
+pub enum AlbumOffer {
+    /// It had nothing to show.
     None,
     /// With the pictures, if it was their turn.
     Offered(Option<Box<FramePictures>>),
 }
 
-impl Picture {
+impl AlbumOffer {
+    /// What an album made of the pictures that it was offered.
     pub fn of(made: Option<FramePictures>) -> Self {
         Self::Offered(made.map(Box::new))
     }
@@ -54,7 +59,7 @@ impl Picture {
 
 /// The journal of a run.
 #[derive(Debug)]
-pub struct Log {
+pub struct RunLog {
     journal: Journal,
     past: Vec<Stretch>,
     /// Frames in the journal.
@@ -63,7 +68,7 @@ pub struct Log {
     pending: Vec<DoneFrame>,
 }
 
-impl Log {
+impl RunLog {
     /// Go on with a journal after the parts that it holds.
     pub fn new(journal: Journal, parts: Parts<Stretch>) -> Self {
         let past: Vec<Stretch> = parts.into_values().flatten().collect();
@@ -88,7 +93,7 @@ impl Log {
 
     /// Whether it is time to write.
     pub(super) fn is_due(&self, wall_ms: f64) -> bool {
-        wall_ms - self.kept_at_ms >= (0.1 * wall_ms).min(LONGEST_MS)
+        wall_ms - self.kept_at_ms >= (STRETCH_SHARE * wall_ms).min(MAX_STRETCH_MS)
     }
 
     /// Write what was added, with what the pipeline keeps of it.

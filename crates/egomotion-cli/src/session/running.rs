@@ -1,4 +1,4 @@
-//! A session under way.
+//! A session under way: what it has done, frame by frame.
 
 use std::time::Instant;
 
@@ -6,30 +6,32 @@ use anyhow::{Result, anyhow};
 use egomotion::geometry::{Image, RigidMotion, Twist};
 use egomotion::pipeline::{FrameMotion, Observe, Trajectory};
 use egomotion_io::recording::{Fetched, Given, Pipeline};
-
-use super::log::{DoneFrame, Log, Picture};
-use super::tally::Tally;
-use super::{Outcome, Row, Session};
-use crate::journal::ANEW;
 use egomotion_report::run::{Album, FramePictures};
 
-pub struct Work<'a> {
+use super::Session;
+use super::outcome::{FrameResult, Outcome};
+use super::run_log::{AlbumOffer, DoneFrame, RunLog};
+use super::stage_times::StageSums;
+use crate::journal::START_ANEW;
+
+/// A session under way.
+pub struct RunningSession<'a> {
     session: &'a Session<'a>,
     pipeline: Pipeline,
-    rows: Vec<Row>,
+    frames: Vec<FrameResult>,
     trajectory: Trajectory,
     truths: Vec<Option<RigidMotion>>,
     /// The frame that the next one is matched with, and its left image: pictures show the maps over it.
     reference: Option<(usize, Image)>,
     album: Album,
-    tally: Tally,
-    log: Option<Log>,
+    times: StageSums,
+    log: Option<RunLog>,
     start: Instant,
     /// Spent before this process went on.
     earlier_ms: f64,
 }
 
-impl<'a> Work<'a> {
+impl<'a> RunningSession<'a> {
     pub fn new(session: &'a Session<'a>) -> Result<Self> {
         Ok(Self {
             session,
@@ -39,12 +41,12 @@ impl<'a> Work<'a> {
                 session.tracks,
                 session.masks.clone(),
             )?,
-            rows: Vec::new(),
+            frames: Vec::new(),
             trajectory: Trajectory::new(),
             truths: Vec::new(),
             reference: None,
             album: Album::of(session.frames),
-            tally: Tally::default(),
+            times: StageSums::default(),
             log: None,
             start: Instant::now(),
             earlier_ms: 0.0,
@@ -53,34 +55,39 @@ impl<'a> Work<'a> {
 
     /// Number of frames that are done.
     pub fn done(&self) -> usize {
-        self.rows.len()
+        self.frames.len()
     }
 
     /// Take over what a log holds, and add to it from here on.
-    pub fn recall(&mut self, mut log: Log, fetch: &impl Fn(usize) -> Option<Fetched>) -> Result<()> {
+    pub fn recall(&mut self, mut log: RunLog, fetch: &impl Fn(usize) -> Option<Fetched>) -> Result<()> {
         let past = log.take_past();
         if let Some(last) = past.last() {
-            (self.earlier_ms, self.tally.aside_ms) = (last.wall_ms, last.aside_ms);
+            (self.earlier_ms, self.times.aside_ms) = (last.wall_ms, last.aside_ms);
             let recalled = self.pipeline.recall(last.memory.clone(), fetch);
-            let left = recalled.map_err(|why| anyhow!("{why}; {ANEW}"))?;
+            let left = recalled.map_err(|why| anyhow!("{why}; {START_ANEW}"))?;
             self.reference = self.pipeline.reference().zip(left);
         }
         for DoneFrame { row, pose, decode_ms, picture, .. } in past.into_iter().flat_map(|s| s.frames) {
-            self.tally.add(decode_ms, &row.motion.stages);
+            self.times.add(decode_ms, &row.motion.stages);
             self.trajectory.push(&row.motion);
             self.truths.push(pose);
-            if let Picture::Offered(made) = picture {
+            if let AlbumOffer::Offered(made) = picture {
                 self.album.recall(made.map(|made| *made));
             }
-            self.rows.push(row);
+            self.frames.push(row);
         }
-        self.session.progress.set_position(self.rows.len() as u64);
+        self.session.progress.set_position(self.frames.len() as u64);
         self.session.progress.reset_eta();
         self.log = Some(log);
         Ok(())
     }
 
-    pub fn frame(&mut self, fetched: Fetched, look: &mut impl FnMut(&Row) -> Result<()>) -> Result<()> {
+    /// Take the next frame; `look` sees its answer with its maps.
+    pub fn frame(
+        &mut self,
+        fetched: Fetched,
+        look: &mut impl FnMut(&FrameResult) -> Result<()>,
+    ) -> Result<()> {
         let Fetched { index, time_s, frame, truth, decode_ms, bytes } = fetched;
         let left = match &frame {
             Ok(Given::Frame(frame)) => Some(frame.left.clone()),
@@ -88,14 +95,14 @@ impl<'a> Work<'a> {
         };
         let motion = self.pipeline.push(time_s, frame);
         self.session.warn(index, &motion);
-        self.tally.add(decode_ms, &motion.stages);
+        self.times.add(decode_ms, &motion.stages);
         self.trajectory.push(&motion);
         self.truths.push(truth);
         let reference = motion.reference;
         let before = reference.and_then(|r| *self.truths.get(r)?);
-        let row = Row {
+        let row = FrameResult {
             index,
-            reference_index: reference.and_then(|r| Some(self.rows.get(r)?.index)),
+            reference_index: reference.and_then(|r| Some(self.frames.get(r)?.index)),
             truth: before.zip(truth).map(|(before, after)| relative(&before, &after)),
             motion,
         };
@@ -108,27 +115,27 @@ impl<'a> Work<'a> {
             self.reference = Some((row.motion.frame, image));
         }
         // Maps are large; a long run keeps only its rows.
-        let row = Row { motion: FrameMotion { dense: None, ..row.motion }, ..row };
+        let row = FrameResult { motion: FrameMotion { dense: None, ..row.motion }, ..row };
         if let Some(log) = &mut self.log {
             log.add(DoneFrame { row: row.clone(), pose: truth, decode_ms, bytes, picture });
         }
-        self.rows.push(row);
+        self.frames.push(row);
         if self.log.as_ref().is_some_and(|log| log.is_due(self.wall_ms())) {
             self.keep()?;
         }
-        self.tally.aside_ms += writing.elapsed().as_secs_f64() * 1e3;
+        self.times.aside_ms += writing.elapsed().as_secs_f64() * 1e3;
         self.session.progress.inc(1);
         Ok(())
     }
 
     /// Pictures of the frame that the maps belong to, or of the left image where there are none.
-    fn picture(&mut self, row: &Row, left: Option<&Image>) -> Picture {
+    fn picture(&mut self, row: &FrameResult, left: Option<&Image>) -> AlbumOffer {
         let motion = &row.motion;
-        let next = self.rows.len() + 1;
+        let next = self.frames.len() + 1;
         if self.session.config.observe == Observe::Sparse {
-            let Some(left) = left else { return Picture::None };
+            let Some(left) = left else { return AlbumOffer::None };
             let width_px = self.album.width_px(left.size());
-            return Picture::of(
+            return AlbumOffer::of(
                 self.album.offer(|| FramePictures::of_image(row.index, next, left, width_px)),
             );
         }
@@ -136,15 +143,15 @@ impl<'a> Work<'a> {
         let (Some(dense), Some((_, image)), Some(dt_s), Some(index)) =
             (&motion.dense, earlier, motion.dt_s, row.reference_index)
         else {
-            return Picture::None;
+            return AlbumOffer::None;
         };
         let width_px = self.album.width_px(image.size());
-        Picture::of(self.album.offer(|| FramePictures::new(index, next - 1, image, dense, dt_s, width_px)))
+        AlbumOffer::of(self.album.offer(|| FramePictures::new(index, next - 1, image, dense, dt_s, width_px)))
     }
 
     /// Write what is done to the log, if there is one.
     pub fn keep(&mut self) -> Result<()> {
-        let (wall_ms, aside_ms) = (self.wall_ms(), self.tally.aside_ms);
+        let (wall_ms, aside_ms) = (self.wall_ms(), self.times.aside_ms);
         match &mut self.log {
             Some(log) => log.keep(self.pipeline.memory(), wall_ms, aside_ms),
             None => Ok(()),
@@ -155,20 +162,21 @@ impl<'a> Work<'a> {
         self.earlier_ms + self.start.elapsed().as_secs_f64() * 1e3
     }
 
+    /// What is left when no frame is to come any more.
     pub fn outcome(self, complete: bool) -> Outcome {
         let wall_ms = self.wall_ms();
-        let count = self.rows.len().max(1) as f64;
+        let count = self.frames.len().max(1) as f64;
         let first = self.truths.first().copied().flatten();
         let truth: Option<Vec<RigidMotion>> =
             self.truths.iter().map(|pose| Some(first?.inverse().after(&(*pose)?))).collect();
         Outcome {
-            complete: complete || self.rows.len() == self.session.frames,
-            rows: self.rows,
+            complete: complete || self.frames.len() == self.session.frames,
+            frames: self.frames,
             trajectory: self.trajectory,
             truth,
             album: self.album,
-            stages_ms: self.tally.means(count),
-            frame_ms: (wall_ms - self.tally.aside_ms) / count,
+            stages_ms: self.times.means(count),
+            frame_ms: (wall_ms - self.times.aside_ms) / count,
             wall_s: wall_ms / 1e3,
             log: self.log,
         }

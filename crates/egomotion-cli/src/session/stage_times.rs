@@ -1,17 +1,17 @@
-//! Where the time goes.
+//! Time that each stage took, summed over frames.
 
 use egomotion::pipeline::stereo::StageTimes;
 
 /// Milliseconds by stage, summed over frames.
 #[derive(Default)]
-pub struct Tally {
+pub struct StageSums {
     decode_ms: f64,
     stages: StageTimes,
     /// Spent on writing and pictures, which is not the pipeline's.
     pub aside_ms: f64,
 }
 
-impl Tally {
+impl StageSums {
     /// Count one frame.
     pub fn add(&mut self, decode_ms: f64, stages: &StageTimes) {
         self.decode_ms += decode_ms;

@@ -1,8 +1,10 @@
-//! Words for people and scripts, on standard output and standard error.
+//! Standard output for results, standard error for messages.
 //!
 //! Nobody listening (`egomotion … | head`) is no failure: the run goes on and its files are written.
 
 use std::io::{ErrorKind, Result, Stderr, Stdout, Write};
+
+use serde::Serialize;
 
 /// A stream whose reader may go away.
 pub struct Stream<W>(W);
@@ -13,7 +15,7 @@ pub fn stdout() -> Stream<Stdout> {
 }
 
 /// Standard error, where messages go.
-pub fn stderr() -> Stream<Stderr> {
+fn stderr() -> Stream<Stderr> {
     Stream(std::io::stderr())
 }
 
@@ -22,13 +24,18 @@ pub fn tell(message: impl std::fmt::Display) {
     let _ = writeln!(stderr(), "egomotion: {message}");
 }
 
-/// The command that repeats this run.
+/// The command that makes these results again: as it was typed, from the start.
 pub fn command_line() -> String {
-    let word = |word: std::ffi::OsString| {
+    let quoted = |word: std::ffi::OsString| {
         let word = word.to_string_lossy().into_owned();
         if word.contains(char::is_whitespace) { format!("'{word}'") } else { word }
     };
-    std::env::args_os().map(word).collect::<Vec<_>>().join(" ")
+    std::env::args_os().map(quoted).collect::<Vec<_>>().join(" ").replace(" --resume", "")
+}
+
+/// A value as JSON on standard output.
+pub fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
+    Ok(writeln!(stdout(), "{}", serde_json::to_string_pretty(value)?)?)
 }
 
 impl<W: Write> Write for Stream<W> {
