@@ -1,5 +1,6 @@
 //! One sequence through the pipeline: the loop that `run` and `demo` share.
 
+mod frame_result;
 mod outcome;
 mod run_log;
 mod running;
@@ -16,7 +17,8 @@ use egomotion_io::recording::{Fetched, with_frames};
 use indicatif::ProgressBar;
 
 use crate::terminal::tell;
-pub use outcome::{FrameResult, Outcome};
+pub use frame_result::FrameResult;
+pub use outcome::Outcome;
 pub use run_log::RunLog;
 use running::RunningSession;
 

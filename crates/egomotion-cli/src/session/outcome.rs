@@ -1,23 +1,11 @@
 //! What a session leaves behind.
 
-use egomotion::geometry::{RigidMotion, Twist};
-use egomotion::pipeline::{FrameMotion, Trajectory};
+use egomotion::geometry::RigidMotion;
+use egomotion::pipeline::Trajectory;
 use egomotion_report::run::Album;
-use serde::{Deserialize, Serialize};
 
+use super::frame_result::FrameResult;
 use super::run_log::RunLog;
-
-/// One answered or unanswered frame; its maps are not kept.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct FrameResult {
-    /// Index of the frame in the source.
-    pub index: usize,
-    /// That of the earlier frame it was matched with.
-    pub reference_index: Option<usize>,
-    pub motion: FrameMotion,
-    /// True φ over the same interval.
-    pub truth: Option<Twist>,
-}
 
 /// What a session leaves behind.
 pub struct Outcome {

@@ -9,7 +9,7 @@ use egomotion_io::recording::Memory;
 use egomotion_report::run::FramePictures;
 use serde::{Deserialize, Serialize};
 
-use super::outcome::FrameResult;
+use super::frame_result::FrameResult;
 use crate::journal::{Journal, Parts};
 
 /// Longest time between two writes, in milliseconds: a kill loses no more work than that.

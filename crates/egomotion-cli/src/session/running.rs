@@ -9,7 +9,8 @@ use egomotion_io::recording::{Fetched, Given, Pipeline};
 use egomotion_report::run::{Album, FramePictures};
 
 use super::Session;
-use super::outcome::{FrameResult, Outcome};
+use super::frame_result::FrameResult;
+use super::outcome::Outcome;
 use super::run_log::{AlbumOffer, DoneFrame, RunLog};
 use super::stage_times::StageSums;
 use crate::journal::START_ANEW;

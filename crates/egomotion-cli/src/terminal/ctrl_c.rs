@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::tell;
+use super::streams::tell;
 
 /// Set when the user asks to stop, which is done after the running `unit` of work; a second time ends the program
 /// at once.
