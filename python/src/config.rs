@@ -1,6 +1,6 @@
 //! Settings from keywords.
 
-use egomotion::pipeline::Config;
+use egomotion::pipeline::{Config, renamed_key};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -9,14 +9,6 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::error;
-
-/// The name that a setting has now, by the keys that lead to the old one.
-fn renamed_key(path: &[&str]) -> Option<&'static str> {
-    match path {
-        ["window"] => Some("vehicle"),
-        _ => None,
-    }
-}
 
 /// Settings by keywords, the others as they are by default; nested ones are dictionaries.
 pub fn from_keywords<T: DeserializeOwned + Default>(

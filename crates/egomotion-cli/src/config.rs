@@ -8,10 +8,11 @@ use egomotion::pipeline::{Config, meaning};
 use toml::{Table, Value};
 
 use crate::args::{ApproachArg, EstimatorArg, MethodArg, ObserveArg};
-use crate::{Ending, terminal};
+use crate::exit::Ending;
+use crate::terminal;
 
-/// Comments are wrapped at this many characters.
-const WIDTH: usize = 96;
+/// Characters of the longest line of a comment; longer ones leave the window of a usual editor.
+const COMMENT_WIDTH: usize = 96;
 
 /// Print the defaults.
 pub fn config() -> Result<Ending> {
@@ -54,7 +55,7 @@ fn comment(text: &mut String, path: &[&str]) {
     let mut line = String::from("#");
     for word in meaning.split("\n\n").next().unwrap_or_default().split_whitespace() {
         let word = word.replace("[`", "").replace("`]", "").replace('`', "");
-        if line.chars().count() + word.chars().count() >= WIDTH {
+        if line.chars().count() + word.chars().count() >= COMMENT_WIDTH {
             text.push_str(&line);
             text.push('\n');
             line = String::from("#");

@@ -9,22 +9,23 @@ use egomotion::metrics;
 use egomotion::pipeline::DenseResults;
 use egomotion::pipeline::{Config, StereoFrame, Unanswered};
 use egomotion::sim::{SensorNoise, Sequence, StereoImages};
-
-use crate::Ending;
-use crate::args::DemoArgs;
-use crate::judge::MapTally;
-use crate::results::{About, ResultFolder};
-use crate::run::set_threads;
-use crate::session::{Outcome, Row, Session, progress, stop_signal};
-use crate::summary::Summary;
-use crate::terminal;
 use egomotion_io::recording::{FrameInput, SourceFrame};
-use egomotion_report::run::Eyes;
+use egomotion_report::run::InputKind;
 
-/// Rays along each side of a pixel that shows an edge.
-const SAMPLES: usize = 3;
-/// Seed of the cameras' noise.
+use crate::args::DemoArgs;
+use crate::exit::Ending;
+use crate::process::set_threads;
+use crate::results::verdict::MapErrors;
+use crate::results::{ResultFolder, RunDescription, Summary, status, write_motion, write_report};
+use crate::session::{FrameResult, Outcome, Session};
+use crate::terminal::{self, frames_bar, stop_signal};
+
+/// Rays along each side of a pixel that shows an edge: more make edges smoother and rendering slower.
+const RAYS_PER_SIDE: usize = 3;
+/// Seed of the cameras' noise; any other makes another demo of the same kind.
 const NOISE_SEED: u64 = 2003;
+/// Pixels between two that maps are judged at, in both directions: errors of neighbours are alike.
+const JUDGED_STEP_PX: usize = 4;
 
 /// Render, run, judge.
 pub fn demo(args: &DemoArgs) -> Result<Ending> {
@@ -41,7 +42,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         frames: sequence.frames(),
         masks: [None, None],
         tracks: false,
-        progress: progress(sequence.frames(), args.quiet),
+        progress: frames_bar(sequence.frames(), args.quiet),
     };
     let mut stdout = terminal::stdout();
     writeln!(
@@ -51,40 +52,40 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
     )?;
     writeln!(stdout, "seen from its left camera, estimate ± σ (truth), in mm and degrees a frame:")?;
     writeln!(stdout, "{}", heading())?;
-    let mut verdicts = Verdicts::default();
+    let mut errors = DemoErrors::default();
     let outcome = session.run(
         None,
         &stop,
         |k| (k < sequence.frames()).then(|| render(&sequence, &noise, k)),
-        |row| {
-            if row.motion.frame > 0 {
-                verdicts.add(&sequence, row);
-                session.progress.suspend(|| writeln!(terminal::stdout(), "{}", line(row)))?;
+        |frame| {
+            if frame.motion.frame > 0 {
+                errors.add(&sequence, frame);
+                session.progress.suspend(|| writeln!(terminal::stdout(), "{}", line(frame)))?;
             }
             Ok(())
         },
     )?;
-    folder.write_motion(&config, &outcome, false)?;
+    write_motion(&folder, &config, &outcome, false)?;
     let mut summary = Summary::new("demo".into(), sequence.rig, &config, &outcome);
-    summary.truth_maps = verdicts.vz.verdict();
+    summary.truth_maps = errors.maps.verdict();
     folder.write_json("summary.json", &summary)?;
-    let about = About {
+    let description = RunDescription {
         title: "A robot's drive through a rendered room",
         source: "rendered by egomotion demo",
         command: "egomotion demo".into(),
         config: &config,
         rig: &sequence.rig,
-        eyes: Eyes::Stereo,
+        input: InputKind::Stereo,
         notes: Vec::new(),
     };
-    folder.write_report(&about, &outcome)?;
-    print_verdict(&mut stdout, &outcome, &summary, &verdicts, &out)?;
-    Ok(if outcome.complete { Ending::Done } else { Ending::Interrupted })
+    write_report(&folder, &description, &outcome)?;
+    print_verdict(&mut stdout, &outcome, &summary, &errors, &out)?;
+    Ok(Ending::of(outcome.complete))
 }
 
 fn render(sequence: &Sequence, noise: &SensorNoise, k: usize) -> SourceFrame {
     let start = Instant::now();
-    let images = sequence.view(k).map(|view| noise.expose(&view.render(SAMPLES), k as u64));
+    let images = sequence.view(k).map(|view| noise.expose(&view.render(RAYS_PER_SIDE), k as u64));
     let time_s = sequence.interval_s * k as f64;
     SourceFrame {
         index: k,
@@ -105,9 +106,9 @@ fn heading() -> String {
     format!("frame {}", columns.join(" "))
 }
 
-fn line(row: &Row) -> String {
-    let (Ok(motion), Some(truth)) = (&row.motion.motion, row.truth) else {
-        return format!("{:>5}  {}", row.index, crate::results::status(row));
+fn line(frame: &FrameResult) -> String {
+    let (Ok(motion), Some(truth)) = (&frame.motion.motion, frame.truth) else {
+        return format!("{:>5}  {}", frame.index, status(frame));
     };
     let columns: Vec<String> = (0..6)
         .map(|i| {
@@ -118,39 +119,36 @@ fn line(row: &Row) -> String {
             format!("{shown:^24}")
         })
         .collect();
-    format!("{:>5} {}", row.index, columns.join(" "))
+    format!("{:>5} {}", frame.index, columns.join(" "))
 }
 
 /// Maps against the rendered truth.
 #[derive(Default)]
-struct Verdicts {
-    vz: MapTally,
+struct DemoErrors {
+    maps: MapErrors,
     impact_errors_s: Vec<f64>,
     impact_inside: usize,
 }
 
-/// Pixels are judged on every so-many-th row and column.
-const STEP: usize = 4;
-
-impl Verdicts {
-    fn add(&mut self, sequence: &Sequence, row: &Row) {
+impl DemoErrors {
+    fn add(&mut self, sequence: &Sequence, frame: &FrameResult) {
         let (Some(dense), Some(reference), Some(dt_s)) =
-            (&row.motion.dense, row.motion.reference, row.motion.dt_s)
+            (&frame.motion.dense, frame.motion.reference, frame.motion.dt_s)
         else {
             return;
         };
         // The truth is that of consecutive frames.
         let (Some(view), Some(phi)) = (sequence.view(reference), sequence.phi(reference)) else { return };
         let (width, height) = dense.disparity.shift.size();
-        for v in (0..height).step_by(STEP) {
-            for u in (0..width).step_by(STEP) {
+        for v in (0..height).step_by(JUDGED_STEP_PX) {
+            for u in (0..width).step_by(JUDGED_STEP_PX) {
                 let Some(truth) = view.truth_at(u as f64, v as f64) else { continue };
                 let moved = view.motion_at(&truth, &phi);
                 if !(truth.in_right && moved.in_later) {
                     continue;
                 }
                 let vz = moved.depth_change_m(&truth);
-                self.vz.add(dense, (u, v), sequence.rig.shift_from_disparity(truth.disparity_px()), vz);
+                self.maps.add(dense, (u, v), sequence.rig.shift_from_disparity(truth.disparity_px()), vz);
                 self.add_impact(dense, (u, v), -moved.later.z * dt_s / vz);
             }
         }
@@ -171,7 +169,7 @@ fn print_verdict(
     out: &mut impl std::io::Write,
     outcome: &Outcome,
     summary: &Summary,
-    verdicts: &Verdicts,
+    errors: &DemoErrors,
     folder: &Path,
 ) -> Result<()> {
     if let Some(truth) = &summary.truth {
@@ -200,8 +198,8 @@ fn print_verdict(
             100.0 * maps.disparity_bad_3px
         )?;
     }
-    if let Some(median) = metrics::quantile(&verdicts.impact_errors_s, 0.5) {
-        let share = verdicts.impact_inside as f64 / verdicts.impact_errors_s.len() as f64;
+    if let Some(median) = metrics::quantile(&errors.impact_errors_s, 0.5) {
+        let share = errors.impact_inside as f64 / errors.impact_errors_s.len() as f64;
         writeln!(
             out,
             "impact      median error {:.1} ms; {:.1} % inside their 95 % interval",

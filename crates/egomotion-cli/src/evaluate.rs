@@ -7,24 +7,23 @@ use egomotion::metrics::TrajectoryAlignment;
 use egomotion_io::evaluation::{Evaluation, EvaluationOptions, StatedUncertainty};
 
 use crate::args::EvaluateArgs;
-use crate::terminal::{self, tell};
-use crate::{Ending, Usage};
+use crate::exit::{Ending, UsageError};
+use crate::terminal::{self, print_json, tell};
 
 /// Read both trajectories, lay them over each other, compare, print.
 pub fn evaluate(args: &EvaluateArgs) -> Result<Ending> {
     let options = args.options();
     if let Some(bad) = options.lengths_m.iter().find(|l| !(l.is_finite() && **l > 0.0)) {
-        return Err(Usage(format!("--lengths: {bad} is not a positive length")).into());
+        return Err(UsageError(format!("--lengths: {bad} is not a positive length")).into());
     }
     let found = Evaluation::of(&args.estimate, &args.truth, &options)?;
     for warning in &found.warnings {
         tell(warning);
     }
-    let mut out = terminal::stdout();
     if args.json {
-        writeln!(out, "{}", serde_json::to_string_pretty(&found.json())?)?;
+        print_json(&found.json())?;
     } else {
-        write!(out, "{}", text(&found, &options))?;
+        write!(terminal::stdout(), "{}", text(&found, &options))?;
     }
     Ok(Ending::Done)
 }
@@ -66,18 +65,18 @@ fn text(found: &Evaluation, options: &EvaluationOptions) -> String {
         };
         text += &format!(
             "position, {}: {:.4} m (root mean square), {:.4} m (largest){scale}\n",
-            words(found.alignment),
+            alignment_in_words(found.alignment),
             absolute.rmse,
             absolute.max
         );
     }
     if let Some(stated) = &found.stated {
-        text += &in_words(stated);
+        text += &stated_uncertainty(stated);
     }
     text
 }
 
-fn in_words(stated: &StatedUncertainty) -> String {
+fn stated_uncertainty(stated: &StatedUncertainty) -> String {
     format!(
         "stated uncertainty: NEES/6 {:.2}; {:.1} % of {} components in their 95 % interval\n",
         stated.nees.per_degree().unwrap_or(f64::NAN),
@@ -86,7 +85,7 @@ fn in_words(stated: &StatedUncertainty) -> String {
     )
 }
 
-fn words(alignment: TrajectoryAlignment) -> &'static str {
+fn alignment_in_words(alignment: TrajectoryAlignment) -> &'static str {
     match alignment {
         TrajectoryAlignment::None => "as given",
         TrajectoryAlignment::Se3 => "laid over the truth",

@@ -7,8 +7,8 @@ use egomotion::geometry::{Camera, Distortion, StereoRectification};
 use egomotion::pipeline::DepthNoise;
 use egomotion_io::source::{Sequence, Source};
 
-use crate::Ending;
 use crate::args::InfoArgs;
+use crate::exit::Ending;
 use crate::terminal;
 
 /// Print layout, frames, rig, time stamps and truth.

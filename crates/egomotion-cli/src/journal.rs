@@ -14,9 +14,12 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// What was begun.
+/// What to do where there is nothing to go on with.
+pub const START_ANEW: &str = "run without --resume to start anew";
+
+/// The first line: what was begun.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Head {
+pub struct JournalHeader {
     /// Version of this program.
     pub version: String,
     /// What it was to do: a run, or a study by its name.
@@ -25,7 +28,7 @@ pub struct Head {
     pub settings: Value,
 }
 
-impl Head {
+impl JournalHeader {
     /// Work of this program.
     pub fn new(work: impl Into<String>, settings: Value) -> Self {
         Self { version: env!("CARGO_PKG_VERSION").into(), work: work.into(), settings }
@@ -35,7 +38,7 @@ impl Head {
     pub fn check(&self, begun: &Self, path: &Path) -> Result<()> {
         if (&begun.work, &begun.version) != (&self.work, &self.version) {
             bail!(
-                "{}: was begun as {} of egomotion {}, this is {} of {}; {ANEW}",
+                "{}: was begun as {} of egomotion {}, this is {} of {}; {START_ANEW}",
                 path.display(),
                 begun.work,
                 begun.version,
@@ -46,7 +49,7 @@ impl Head {
         let differences = differences(&begun.settings, &self.settings);
         if !differences.is_empty() {
             bail!(
-                "{}: was begun with other settings: {}; give the same settings, or {ANEW}",
+                "{}: was begun with other settings: {}; give the same settings, or {START_ANEW}",
                 path.display(),
                 differences.join(", ")
             );
@@ -55,9 +58,9 @@ impl Head {
     }
 }
 
-/// One part that is done.
+/// A line after the first: one part that is done.
 #[derive(Serialize, Deserialize)]
-struct Done {
+struct DonePart {
     part: String,
     records: String,
 }
@@ -74,16 +77,16 @@ pub type Parts<R> = BTreeMap<String, Vec<R>>;
 
 impl Journal {
     /// Begin anew.
-    pub fn begin(path: &Path, head: &Head) -> Result<Self> {
+    pub fn begin(path: &Path, header: &JournalHeader) -> Result<Self> {
         let file = File::create(path).map_err(|e| IoError::system(path, "write", &e))?;
         let mut journal = Self { path: path.to_owned(), file };
-        journal.line(head)?;
+        journal.line(header)?;
         Ok(journal)
     }
 
     /// Go on with what is there, if it was begun by the same program with the same settings; without a file
     /// begin anew. A last line that was not written to its end is dropped.
-    pub fn resume<R: DeserializeOwned>(path: &Path, head: &Head) -> Result<(Self, Parts<R>)> {
+    pub fn resume<R: DeserializeOwned>(path: &Path, header: &JournalHeader) -> Result<(Self, Parts<R>)> {
         let content = match fs::read(path) {
             Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
             other => other.map_err(|e| IoError::system(path, "read", &e))?,
@@ -91,12 +94,12 @@ impl Journal {
         let mut lines: Vec<&[u8]> = content.split_inclusive(|&b| b == b'\n').collect();
         lines.pop_if(|last| !last.ends_with(b"\n"));
         let Some((first, rest)) = lines.split_first() else {
-            return Ok((Self::begin(path, head)?, Parts::new()));
+            return Ok((Self::begin(path, header)?, Parts::new()));
         };
         let Ok(begun) = serde_json::from_slice(first) else {
-            return Err(IoError::new(path, "does not tell what was begun", ANEW).at_line(1).into());
+            return Err(IoError::new(path, "does not tell what was begun", START_ANEW).at_line(1).into());
         };
-        head.check(&begun, path)?;
+        header.check(&begun, path)?;
         let (mut parts, mut kept) = (Parts::new(), first.len());
         for (k, line) in rest.iter().enumerate() {
             match part(line) {
@@ -104,7 +107,7 @@ impl Journal {
                 // What a crash left behind the last part that is whole.
                 Err(_) if k + 1 == rest.len() => break,
                 Err(error) => {
-                    return Err(IoError::new(path, error, ANEW).at_line(k + 2).into());
+                    return Err(IoError::new(path, error, START_ANEW).at_line(k + 2).into());
                 }
             };
             kept += line.len();
@@ -120,7 +123,7 @@ impl Journal {
 
     /// Add a part.
     pub fn add<R: Serialize>(&mut self, name: &str, records: &[R]) -> Result<()> {
-        self.line(&Done { part: name.to_owned(), records: in_ron(name, records)? })
+        self.line(&DonePart { part: name.to_owned(), records: in_ron(name, records)? })
     }
 
     /// Add a part, and give its records back as they will be read when the work is resumed.
@@ -128,7 +131,7 @@ impl Journal {
         let records = in_ron(name, records)?;
         let again =
             ron::from_str(&records).with_context(|| format!("the records of {name} cannot be read back"))?;
-        self.line(&Done { part: name.to_owned(), records })?;
+        self.line(&DonePart { part: name.to_owned(), records })?;
         Ok(again)
     }
 
@@ -145,15 +148,12 @@ impl Journal {
     }
 }
 
-/// What to do where nothing can be gone on with.
-pub const ANEW: &str = "run without --resume to start anew";
-
 fn in_ron<R: Serialize>(name: &str, records: &[R]) -> Result<String> {
     ron::to_string(records).with_context(|| format!("the records of {name} cannot be kept"))
 }
 
 fn part<R: DeserializeOwned>(line: &[u8]) -> Result<(String, Vec<R>)> {
-    let done: Done = serde_json::from_slice(line)?;
+    let done: DonePart = serde_json::from_slice(line)?;
     Ok((done.part, ron::from_str(&done.records)?))
 }
 
@@ -219,7 +219,7 @@ mod tests {
     fn every_number_comes_back_as_it_was() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.parts.jsonl");
-        let head = Head::new("a", json!({"seed": 1}));
+        let header = JournalHeader::new("a", json!({"seed": 1}));
         // Patterns of bits from a linear congruential generator: every exponent, both signs.
         let mut state = 2003_u64;
         let mut next = || {
@@ -249,9 +249,9 @@ mod tests {
         };
         let records =
             [record(None), record(Some(f64::NAN)), Record { kind: Kind::Plain, ..record(Some(2.0)) }];
-        let mut journal = Journal::begin(&path, &head).unwrap();
+        let mut journal = Journal::begin(&path, &header).unwrap();
         let taken = journal.exchange("one", &records).unwrap();
-        let (_, parts) = Journal::resume::<Record>(&path, &head).unwrap();
+        let (_, parts) = Journal::resume::<Record>(&path, &header).unwrap();
         for found in [&taken, &parts["one"]] {
             assert_eq!(
                 found.iter().map(bits).collect::<Vec<_>>(),

@@ -6,8 +6,9 @@ use anyhow::Result;
 use clap::CommandFactory;
 
 use crate::args::{Cli, CompletionsArgs, ManArgs};
+use crate::exit::Ending;
 use crate::results::ResultFolder;
-use crate::{Ending, terminal};
+use crate::terminal;
 
 /// Print a shell's completion script.
 pub fn completions(args: &CompletionsArgs) -> Result<Ending> {

@@ -8,14 +8,14 @@ use anyhow::Result;
 use egomotion_io::simulation::{SequenceFolder, Simulation};
 
 use crate::args::SimulateArgs;
-use crate::run::set_threads;
-use crate::session::{progress, stop_signal};
-use crate::{Ending, refusal, terminal};
+use crate::exit::{Ending, choice_error};
+use crate::process::set_threads;
+use crate::terminal::{self, frames_bar, stop_signal};
 
 /// Render frame by frame and write.
 pub fn simulate(args: &SimulateArgs) -> Result<Ending> {
     set_threads(args.threads)?;
-    let world = Simulation::new(&args.options()).map_err(refusal)?;
+    let world = Simulation::new(&args.options()).map_err(choice_error)?;
     for warning in &world.warnings {
         terminal::tell(warning);
     }
@@ -24,7 +24,7 @@ pub fn simulate(args: &SimulateArgs) -> Result<Ending> {
     let folder = SequenceFolder::create(&out, world.frames)?;
     let stop = stop_signal("frame");
     folder.write_scene(&world)?;
-    let bar = progress(world.frames, args.quiet);
+    let bar = frames_bar(world.frames, args.quiet);
     bar.set_message(name.clone());
     let mut done = 0;
     while done < world.frames && !stop.load(Ordering::Relaxed) {
@@ -47,5 +47,5 @@ pub fn simulate(args: &SimulateArgs) -> Result<Ending> {
         rig.baseline_m,
         world.noise_in_words()
     )?;
-    Ok(if done == world.frames { Ending::Done } else { Ending::Interrupted })
+    Ok(Ending::of(done == world.frames))
 }

@@ -80,7 +80,10 @@ try {
   const play = document.getElementById('play');
   if (play) {
     play.click();
-    await new Promise(done => setTimeout(done, 300));
+    await new Promise(done => {
+      const look = () => +slider.value === seen.afterClick ? setTimeout(look, 10) : done();
+      look();
+    });
     play.click();
     seen.afterPlay = +slider.value;
   }

@@ -33,7 +33,7 @@ pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, IoError> {
 ///
 /// # Errors
 /// The file cannot be read, is longer than 256 MB, or is not UTF-8.
-pub(crate) fn text(path: &Path) -> Result<String, IoError> {
+pub fn text(path: &Path) -> Result<String, IoError> {
     let not_text =
         |_| IoError::new(path, "is not a text file", "check that the name belongs to this kind of file");
     String::from_utf8(bounded(path, MAX_TEXT_BYTES)?).map_err(not_text)
@@ -44,15 +44,26 @@ pub(crate) fn text(path: &Path) -> Result<String, IoError> {
 /// # Errors
 /// The file cannot be read, or does not hold such a value; the error names the line.
 pub fn toml<T: DeserializeOwned>(path: &Path) -> Result<T, IoError> {
-    let text = text(path)?;
-    ::toml::from_str(&text).map_err(|e| {
-        let breaks = |end: usize| text.bytes().take(end).filter(|&b| b == b'\n').count();
+    toml_text(&text(path)?, path)
+}
+
+/// The value that a text in TOML holds; errors name the file at `path`, which it was read from.
+///
+/// # Errors
+/// The text does not hold such a value; the error names the line.
+pub fn toml_text<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T, IoError> {
+    ::toml::from_str(text).map_err(|e| {
         let error = IoError::new(path, e.message().replace('\n', " "), "correct the file");
         match e.span() {
-            Some(span) => error.at_line(breaks(span.start) + 1),
+            Some(span) => error.at_line(line_at(text, span.start)),
             None => error,
         }
     })
+}
+
+/// Number of the line, from 1, on which the byte at `offset` stands.
+pub fn line_at(text: &str, offset: usize) -> usize {
+    text.bytes().take(offset).filter(|&b| b == b'\n').count() + 1
 }
 
 fn bounded(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {

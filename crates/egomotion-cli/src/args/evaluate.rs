@@ -1,4 +1,4 @@
-//! Options of `evaluate`.
+//! EvaluationOptions of `evaluate`.
 
 use std::path::PathBuf;
 

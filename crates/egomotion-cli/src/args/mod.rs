@@ -1,17 +1,22 @@
 //! What can be typed.
 
+mod choices;
 mod evaluate;
 mod run;
+mod simulate;
+pub mod study;
+mod values;
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 
-use crate::study::StudyCommand;
-use egomotion_io::simulation::{SimulationOptions, check_size};
-
+pub use choices::{ApproachArg, EstimatorArg, MapFormatArg, MethodArg, ObserveArg};
 pub use evaluate::EvaluateArgs;
-pub use run::{ApproachArg, CloudArg, EstimatorArg, MapFormat, MethodArg, ObserveArg, RunArgs};
+pub use run::RunArgs;
+pub use simulate::SimulateArgs;
+use study::StudyCommand;
+use values::positive;
 
 /// 3D motion, depth velocity and time to impact from stereo, each with an uncertainty that can be trusted.
 #[derive(Debug, Parser)]
@@ -85,101 +90,10 @@ pub struct DemoArgs {
 }
 
 #[derive(Debug, Args)]
-pub struct SimulateArgs {
-    /// Name of the motion and its scene: A, B, C, drive, demo … (any other name lists them all).
-    #[arg(long, value_name = "NAME")]
-    pub sequence: String,
-    /// Factor of every motion.
-    #[arg(long, value_name = "S", default_value_t = 1.0, allow_negative_numbers = true, value_parser = step)]
-    pub step: f64,
-    /// Number of frames [default: the sequence's own].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=MAX_FRAMES))]
-    pub frames: Option<u32>,
-    /// Size of the images; the focal length scales with the width [default: the sequence's own].
-    #[arg(long, value_name = "WxH", value_parser = size)]
-    pub size: Option<(usize, usize)>,
-    /// What the cameras add to the light [default: that of the scene file, or sensor].
-    #[arg(long, value_enum)]
-    pub noise: Option<NoiseArg>,
-    /// Seed of the cameras' noise [default: that of the scene file, or 0].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=MAX_SEED))]
-    pub seed: Option<u64>,
-    /// Seed of the texture on every surface [default: the scene's own].
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=MAX_SEED))]
-    pub texture: Option<u64>,
-    /// Scene (and, if it has them, rig and sensor) in place of the sequence's own, as in scene.toml.
-    #[arg(long, value_name = "FILE")]
-    pub scene: Option<PathBuf>,
-    /// Folder for the sequence [default: egomotion-out/NAME].
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Worker threads; the results do not depend on their number.
-    #[arg(long, value_name = "N", value_parser = positive)]
-    pub threads: Option<usize>,
-    /// Show no progress.
-    #[arg(long)]
-    pub quiet: bool,
-}
-
-impl SimulateArgs {
-    /// What is asked for.
-    pub fn options(&self) -> SimulationOptions {
-        SimulationOptions {
-            sequence: self.sequence.clone(),
-            step: self.step,
-            frames: self.frames.map(|frames| frames as usize),
-            size_px: self.size,
-            noise: self.noise.map(|noise| matches!(noise, NoiseArg::Sensor)),
-            seed: self.seed,
-            texture: self.texture,
-            scene: self.scene.clone(),
-        }
-    }
-}
-
-/// Files are numbered with six digits.
-const MAX_FRAMES: i64 = 1_000_000;
-/// TOML's integers end here.
-const MAX_SEED: u64 = i64::MAX as u64;
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum NoiseArg {
-    /// Read and shot noise, the right camera with a gain and an offset.
-    Sensor,
-    /// Rounding to 8 bits alone.
-    None,
-}
-
-#[derive(Debug, Args)]
 pub struct InfoArgs {
     /// Folder of the sequence or set.
     pub source: PathBuf,
     /// Calibration to use in place of the source's own, as for run.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
-}
-
-/// A whole number of at least 1.
-pub fn positive(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(0) => Err("must be at least 1".into()),
-        Ok(n) => Ok(n),
-        Err(e) => Err(format!("{e}")),
-    }
-}
-
-fn step(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(step) if step.is_finite() && step >= 0.0 => Ok(step),
-        Ok(_) => Err("must be a finite number that is not negative".into()),
-        Err(e) => Err(format!("{e}")),
-    }
-}
-
-/// WxH.
-pub fn size(text: &str) -> Result<(usize, usize), String> {
-    let (width, height) = text.split_once(['x', 'X']).ok_or("give width x height, as 640x480")?;
-    let side = |text: &str| text.parse::<usize>().map_err(|e| format!("{e}"));
-    let size = (side(width)?, side(height)?);
-    check_size(size).map(|()| size)
 }

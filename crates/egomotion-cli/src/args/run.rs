@@ -2,15 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
-use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
-use egomotion_io::recording::{RecordingOptions, Sensor};
+use clap::Args;
 use serde::{Serialize, Serializer};
 
-use super::positive;
-use crate::maps::MapFiles;
+use super::choices::{ApproachArg, CloudArg, EstimatorArg, MapFormatArg, MethodArg, ObserveArg, SensorArg};
+use super::values::{frame_size, positive, rate};
 
-// What is serialised must be alike when a run goes on; the rest is in `Config`, or is of no consequence for the results.
+// What is serialised is `options` of `summary.json`, and must be alike when a run goes on. The rest is in `Config`, or
+// does not change the results.
 #[derive(Debug, Args, Serialize)]
 pub struct RunArgs {
     /// Folder of the sequence, an .npz of stereo tracks, or - for images piped in.
@@ -86,7 +85,7 @@ pub struct RunArgs {
     pub maps: bool,
     /// Write the maps of every frame in these formats.
     #[arg(long, value_enum, value_name = "FORMAT,…", value_delimiter = ',')]
-    pub maps_as: Vec<MapFormat>,
+    pub maps_as: Vec<MapFormatArg>,
     /// Write every frame as a cloud of points (PLY) in the colours of a quantity.
     #[arg(long, value_enum, value_name = "QUANTITY")]
     pub cloud: Option<CloudArg>,
@@ -119,35 +118,6 @@ pub struct RunArgs {
     pub json: bool,
 }
 
-impl RunArgs {
-    /// What is taken of the recording.
-    pub fn recording_options(&self) -> RecordingOptions {
-        RecordingOptions {
-            start: self.start,
-            frames: self.frames,
-            stride: Some(self.stride),
-            reverse: self.reverse,
-            sensor: self.sensor.map(|sensor| match sensor {
-                SensorArg::Stereo => Sensor::Stereo,
-                SensorArg::Depth => Sensor::Depth,
-            }),
-            disparity: self.disparity.clone(),
-            flow: self.flow.clone(),
-            tracks: self.tracks.clone(),
-            mask: self.mask.clone(),
-        }
-    }
-
-    /// What is written of each frame pair.
-    pub fn map_files(&self) -> MapFiles {
-        let mut formats = self.maps_as.clone();
-        if self.maps && !formats.contains(&MapFormat::Pfm) {
-            formats.push(MapFormat::Pfm);
-        }
-        MapFiles { formats, cloud: self.cloud }
-    }
-}
-
 /// Where a file or folder is, whatever it was called from where; of a file also its size.
 fn place<S: Serializer>(path: &Option<PathBuf>, serializer: S) -> Result<S::Ok, S::Error> {
     path.as_deref().map(placed).serialize(serializer)
@@ -163,94 +133,4 @@ fn placed(path: &Path) -> String {
         Ok(about) if about.is_file() => format!("{} ({} bytes)", full.display(), about.len()),
         _ => full.display().to_string(),
     }
-}
-
-/// A format of maps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-pub enum MapFormat {
-    /// PFM, flow as .flo.
-    Pfm,
-    /// NumPy arrays of single precision.
-    Npy,
-    /// KITTI's 16-bit PNG, of disparity and flow alone.
-    Kitti,
-    /// PNG in colours, to look at.
-    Colour,
-}
-
-/// What a cloud's colours show.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-pub enum CloudArg {
-    /// Depth velocity.
-    Vz,
-    /// Time to impact.
-    Impact,
-}
-
-impl CloudArg {
-    /// Name of the property in the file.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Vz => "depth_velocity",
-            Self::Impact => "impact",
-        }
-    }
-}
-
-/// WxH of any positive size.
-fn frame_size(text: &str) -> Result<(usize, usize), String> {
-    let (width, height) = text.split_once(['x', 'X']).ok_or("give width x height, as 640x480")?;
-    Ok((positive(width)?, positive(height)?))
-}
-
-fn rate(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
-        Ok(_) => Err("must be a positive number".into()),
-        Err(e) => Err(format!("{e}")),
-    }
-}
-
-/// A choice of the library's, as a word of the command line.
-macro_rules! choice {
-    ($name:ident for $target:ident { $($variant:ident: $help:literal),+ $(,)? }) => {
-        #[derive(Debug, Clone, Copy, ValueEnum)]
-        pub enum $name { $(#[doc = $help] $variant),+ }
-        impl From<$name> for $target {
-            fn from(value: $name) -> Self {
-                match value { $($name::$variant => Self::$variant),+ }
-            }
-        }
-    };
-}
-
-choice!(MethodArg for Method {
-    Ml: "Maximum likelihood in the measured (x, y, disparity) at both times.",
-    Dcce: "The paper's depth change constraint.",
-    Dv: "The paper's binocular flow, in two steps.",
-    Joint: "Binocular flow and image flow solved together.",
-    Rigid: "Point pairs with a rotation.",
-    Linear22: "Point pairs with any matrix.",
-});
-choice!(ApproachArg for Approach {
-    Discrete: "Finite displacements between two frames.",
-    Differential: "Velocities and derivatives.",
-});
-choice!(EstimatorArg for EstimatorKind {
-    Ls: "Least squares, all rows alike.",
-    Lmeds: "Least median of squares.",
-    Irls: "Reweighted least squares, rows weighted by their variance.",
-    Eiv: "Least squares corrected for the bias of noisy gradients (method dcce alone).",
-});
-choice!(ObserveArg for Observe {
-    Dense: "Disparity and flow of every pixel, with all maps.",
-    Sparse: "Tracked corners alone.",
-});
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-pub enum SensorArg {
-    /// Left and right images.
-    Stereo,
-    /// Left images and depth images.
-    Depth,
 }

@@ -7,15 +7,24 @@ use anyhow::Result;
 use egomotion::pipeline::{Config, Unanswered};
 use egomotion_io::recording::Recording;
 use egomotion_io::source::Sequence;
+use egomotion_report::run::InputKind;
 
-use super::resume::{self, Settings};
-use crate::args::RunArgs;
-use crate::judge::{self, MapVerdict};
-use crate::results::{About, ResultFolder};
-use crate::session::{Outcome, Row, Session, progress};
-use crate::summary::{Cameras, Summary};
-use crate::{Usage, refusal, terminal};
-use egomotion_report::run::Eyes;
+use super::plan::{RecordingInput, RunPlan, checked};
+use super::resume::{RunIdentity, open_log};
+use crate::exit::{UsageError, choice_error};
+use crate::results::verdict::{MapVerdict, scene_maps};
+use crate::results::{Cameras, ResultFolder, RunDescription, Summary, write_motion, write_report};
+use crate::session::{FrameResult, Outcome, RunLog, Session};
+use crate::terminal::{self, frames_bar};
+
+/// One sequence that is to be run into a folder.
+pub struct SequenceRun<'a> {
+    pub plan: &'a RunPlan,
+    pub input: &'a RecordingInput,
+    pub sequence: &'a Sequence,
+    pub out: &'a Path,
+    pub stop: &'a AtomicBool,
+}
 
 /// A finished sequence.
 pub struct DoneSequence {
@@ -23,117 +32,134 @@ pub struct DoneSequence {
     pub first_failure: Option<String>,
 }
 
-/// Run one sequence into a folder; if it stands `alone`, so that it can be resumed. `None` where it was complete
-/// before.
-pub fn run_sequence(
-    args: &RunArgs,
-    config: &Config,
-    sequence: &Sequence,
-    out: &Path,
-    stop: &AtomicBool,
-    alone: bool,
-) -> Result<Option<DoneSequence>> {
-    let recording = Recording::open(&args.source, sequence, &args.recording_options()).map_err(refusal)?;
-    let (rig, frames) = (recording.rig, recording.len());
-    let config = &suited(args, config, &recording)?;
-    let folder = ResultFolder::create(out)?;
-    let cameras = Cameras::of(sequence);
-    let settings = Settings { options: args, config, rig: Some(&rig), cameras: cameras.clone(), frames };
-    let mut log = None;
-    if alone {
-        log = resume::log(out, &settings.head()?, args.resume, &recording)?;
-        if log.is_none() {
-            return Ok(None);
+/// A sequence whose frames are chosen, with the settings that suit it.
+struct Opened {
+    recording: Recording,
+    config: Config,
+    folder: ResultFolder,
+}
+
+impl SequenceRun<'_> {
+    /// Run with a log of the frames that are done, so that the run can be resumed; `None` where it was complete before.
+    pub fn logged(&self) -> Result<Option<DoneSequence>> {
+        let opened = self.open()?;
+        let identity = RunIdentity {
+            options: &self.plan.options,
+            config: &opened.config,
+            rig: Some(&opened.recording.rig),
+            cameras: Cameras::of(self.sequence),
+            frames: opened.recording.len(),
+        };
+        let log = open_log(self.out, &identity.header()?, self.plan.resume, &opened.recording)?;
+        log.map(|log| self.run(&opened, Some(log))).transpose()
+    }
+
+    /// Run without a log.
+    pub fn unlogged(&self) -> Result<DoneSequence> {
+        self.run(&self.open()?, None)
+    }
+
+    fn open(&self) -> Result<Opened> {
+        let recording = Recording::open(&self.input.path, self.sequence, &self.input.selection);
+        let recording = recording.map_err(choice_error)?;
+        let config = recording.config(&self.plan.config);
+        checked(&config)?;
+        if recording.is_of_tracks() && self.plan.maps.any() {
+            return Err(UsageError("--maps need images, not tracks".into()).into());
         }
+        Ok(Opened { recording, config, folder: ResultFolder::create(self.out)? })
     }
-    let maps = args.map_files();
-    maps.folders(out)?;
-    if args.resume {
-        folder.sweep()?;
-        maps.sweep(out)?;
+
+    fn run(&self, opened: &Opened, log: Option<RunLog>) -> Result<DoneSequence> {
+        let (mut outcome, truth_maps) = self.estimate(opened, log)?;
+        let log = outcome.log.take();
+        let mut summary = Summary::new(
+            self.input.path.display().to_string(),
+            opened.recording.rig,
+            &opened.config,
+            &outcome,
+        );
+        summary.truth_maps = truth_maps;
+        (summary.options, summary.cameras) = (Some(self.plan.options.clone()), Cameras::of(self.sequence));
+        self.write(opened, &summary, &outcome)?;
+        match log {
+            Some(log) if outcome.complete => log.remove()?,
+            Some(_) => terminal::tell(format_args!(
+                "stopped after {} of {} frames; the same command with --resume goes on",
+                summary.frames,
+                opened.recording.len()
+            )),
+            None => {}
+        }
+        Ok(DoneSequence { summary, first_failure: first_failure(&outcome.frames) })
     }
-    let bar = progress(frames, args.quiet);
-    bar.set_message(sequence.name.clone());
-    let session = Session {
-        rig,
-        config,
-        frames,
-        masks: recording.masks.clone(),
-        tracks: recording.is_of_tracks(),
-        progress: bar,
-    };
-    let mut truth_maps: Option<MapVerdict> = None;
-    let outcome = session.run(
-        log,
-        stop,
-        |k| recording.read_frame(k),
-        |row| {
-            let (Some(dense), Some(index)) = (&row.motion.dense, row.reference_index) else { return Ok(()) };
-            if let Some(truth) = sequence.truth_files.as_ref().filter(|t| t.index == index && !args.reverse) {
-                truth_maps = judge::scene_maps(&rig, dense, truth)?;
+
+    /// Every frame through the pipeline; maps are written as they come, and judged where the source knows their truth.
+    fn estimate(&self, opened: &Opened, log: Option<RunLog>) -> Result<(Outcome, Option<MapVerdict>)> {
+        let Opened { recording, config, folder } = opened;
+        let (rig, maps) = (recording.rig, &self.plan.maps);
+        maps.folders(self.out)?;
+        if self.plan.resume {
+            folder.sweep()?;
+            maps.sweep(self.out)?;
+        }
+        let progress = frames_bar(recording.len(), self.plan.quiet);
+        progress.set_message(self.sequence.name.clone());
+        let session = Session {
+            rig,
+            config,
+            frames: recording.len(),
+            masks: recording.masks.clone(),
+            tracks: recording.is_of_tracks(),
+            progress,
+        };
+        let forwards = !self.input.selection.reverse;
+        let mut verdict: Option<MapVerdict> = None;
+        let fetch = |k| recording.read_frame(k);
+        let outcome = session.run(log, self.stop, fetch, |frame| {
+            let (Some(dense), Some(index)) = (&frame.motion.dense, frame.reference_index) else {
+                return Ok(());
+            };
+            if let Some(truth) = self.sequence.truth_files.as_ref().filter(|t| t.index == index && forwards) {
+                verdict = scene_maps(&rig, dense, truth)?;
             }
-            maps.write(out, index, dense, &rig)
-        },
-    )?;
-    let mut summary = Summary::new(args.source.display().to_string(), rig, config, &outcome);
-    summary.truth_maps = truth_maps;
-    (summary.options, summary.cameras) = (Some(serde_json::to_value(args)?), cameras);
-    let eyes = match (recording.is_of_tracks(), recording.is_of_depth()) {
-        (true, _) => Eyes::Tracks,
-        (false, true) => Eyes::Depth,
-        (false, false) => Eyes::Stereo,
-    };
-    folder.write_motion(config, &outcome, args.parquet)?;
-    write_about(&folder, &sequence.name, eyes, &summary, &outcome)?;
-    let first_failure = first_failure(&outcome.rows);
-    match outcome.log {
-        Some(log) if outcome.complete => log.remove()?,
-        Some(_) => terminal::tell(format_args!(
-            "stopped after {} of {} frames; the same command with --resume goes on",
-            summary.frames, frames
-        )),
-        None => {}
+            maps.write(self.out, index, dense, &rig)
+        })?;
+        Ok((outcome, verdict))
     }
-    Ok(Some(DoneSequence { summary, first_failure }))
+
+    /// The files of the whole sequence.
+    fn write(&self, opened: &Opened, summary: &Summary, outcome: &Outcome) -> Result<()> {
+        let (folder, name) = (&opened.folder, &self.sequence.name);
+        write_motion(folder, &opened.config, outcome, self.plan.parquet)?;
+        for warning in &summary.warnings {
+            terminal::tell(format_args!("{name}: warning: {warning}"));
+        }
+        folder.write_json("summary.json", summary)?;
+        let description = RunDescription {
+            title: &format!("How the camera moved: {name}"),
+            source: &summary.source,
+            command: terminal::command_line(),
+            config: &summary.config,
+            rig: &summary.rig,
+            input: input_kind(&opened.recording),
+            notes: notes(summary),
+        };
+        write_report(folder, &description, outcome)
+    }
 }
 
-/// The settings as they apply to a recording, where they fit together.
-fn suited(args: &RunArgs, config: &Config, recording: &Recording) -> Result<Config> {
-    let config = recording.config(config);
-    config.check().map_err(|e| anyhow::Error::new(Usage(e.to_string())))?;
-    if recording.is_of_tracks() && args.map_files().any() {
-        return Err(Usage("--maps need images, not tracks".into()).into());
+fn input_kind(recording: &Recording) -> InputKind {
+    match (recording.is_of_tracks(), recording.is_of_depth()) {
+        (true, _) => InputKind::Tracks,
+        (false, true) => InputKind::Depth,
+        (false, false) => InputKind::Stereo,
     }
-    Ok(config)
-}
-
-/// Summary and report.
-fn write_about(
-    folder: &ResultFolder,
-    name: &str,
-    eyes: Eyes,
-    summary: &Summary,
-    outcome: &Outcome,
-) -> Result<()> {
-    for warning in &summary.warnings {
-        terminal::tell(format_args!("{name}: warning: {warning}"));
-    }
-    folder.write_json("summary.json", summary)?;
-    let about = About {
-        title: &format!("How the camera moved: {name}"),
-        source: &summary.source,
-        command: terminal::command_line().replace(" --resume", ""),
-        config: &summary.config,
-        rig: &summary.rig,
-        eyes,
-        notes: notes(summary),
-    };
-    folder.write_report(&about, outcome)
 }
 
 /// Why the first frame without an answer has none.
-fn first_failure(rows: &[Row]) -> Option<String> {
-    let failures = rows.iter().filter_map(|row| row.motion.motion.as_ref().err());
+fn first_failure(frames: &[FrameResult]) -> Option<String> {
+    let failures = frames.iter().filter_map(|frame| frame.motion.motion.as_ref().err());
     failures.filter(|why| **why != Unanswered::First).map(ToString::to_string).next()
 }
 

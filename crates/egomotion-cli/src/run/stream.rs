@@ -1,72 +1,105 @@
 //! `egomotion run -`: frames from standard input, one JSON line out for each as soon as it is known.
 
-use std::io::{Read, Write as _};
+use std::io::{Read, Stdin, Write as _};
 use std::path::Path;
 use std::sync::Mutex;
 
 use anyhow::{Result, bail};
 use egomotion::geometry::{Grid, Image};
 use egomotion::observe::{RectificationMap, Rectifier};
-use egomotion::pipeline::{Config, Frame, StereoFrame, Unanswered};
+use egomotion::pipeline::{Frame, StereoFrame, Unanswered};
 use egomotion_io::IoError;
 use egomotion_io::calibration::{self, CameraPair};
 use egomotion_io::recording::{FrameInput, SourceFrame, halves, unseen};
-use egomotion_io::stream::{ImageStream, StreamFormat};
+use egomotion_io::stream::ImageStream;
+use egomotion_report::run::InputKind;
 use serde_json::{Value, json};
 
-use crate::args::RunArgs;
-use crate::results::{About, ResultFolder, motion_row};
-use crate::session::{Row, Session, progress, stop_signal};
-use crate::summary::Summary;
-use crate::{Ending, Usage, terminal};
-use egomotion_report::run::Eyes;
+use super::plan::{RunPlan, StreamInput};
+use crate::exit::Ending;
+use crate::results::{ResultFolder, RunDescription, Summary, motion_row, write_motion, write_report};
+use crate::session::{FrameResult, Outcome, Session};
+use crate::terminal::{self, frames_bar, stop_signal};
 
-/// What errors call the stream, and the folder of its results.
-const NAME: (&str, &str) = ("standard input", "egomotion-out/stdin");
+/// What errors and results call the stream.
+const NAME: &str = "standard input";
 
 /// Run the frames that are piped in.
-pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
-    if args.resume {
-        return Err(
-            Usage("frames on standard input cannot be had again: --resume needs a recording".into()).into()
-        );
-    }
-    let Some(file) = &args.calibration else {
-        return Err(Usage("frames on standard input need --calibration FILE".into()).into());
-    };
-    let kind = args.raw.map_or(StreamFormat::Png, |(width, height)| StreamFormat::Raw { width, height });
-    let images = ImageStream::new(std::io::stdin(), kind, Path::new(NAME.0));
-    let mut pairs = Pairs { images, side_by_side: args.side_by_side };
-    let Some(first) = pairs.next()? else {
-        bail!("{}: holds no frame; pipe left and right images in", NAME.0)
-    };
+pub fn run(plan: &RunPlan, input: &StreamInput) -> Result<Ending> {
+    let images = ImageStream::new(std::io::stdin(), input.kind, Path::new(NAME));
+    let mut pairs = ImagePairs { images, side_by_side: input.side_by_side };
+    let Some(first) = pairs.next()? else { bail!("{NAME}: holds no frame; pipe left and right images in") };
+    let file = &input.calibration;
     let pair = calibration::read(file)?.pair(CameraPair::Grey, first.0.size(), file)?;
     let rectifier = pair.rectification.as_ref().map(Rectifier::new);
-    let out = args.out.clone().unwrap_or_else(|| NAME.1.into());
-    let folder = ResultFolder::create(&out)?;
-    let maps = args.map_files();
-    maps.folders(&out)?;
-    // Progress would stand between the lines of whoever looks at both.
-    let masks = unseen(rectifier.as_ref());
-    let session =
-        Session { rig: pair.rig, config, frames: 0, masks, tracks: false, progress: progress(0, true) };
-    let stop = stop_signal("frame");
-    let source = Mutex::new((Some(first), pairs));
-    let fetch = |k: usize| {
-        let (first, pairs) = &mut *source.lock().ok()?;
-        let found = match first.take() {
-            Some(first) => Ok(Some(first)),
-            None => pairs.next(),
-        };
-        let images = found.transpose()?;
-        let time_s = k as f64 / args.rate;
-        let frame = images.map_err(|error: IoError| Unanswered::BadImage(error.to_string())).and_then(
-            |(left, right)| -> Result<Frame, Unanswered> {
-                let left = rectified(rectifier.as_ref().map(Rectifier::left), left)?;
-                let right = rectified(rectifier.as_ref().map(Rectifier::right), right)?;
-                Ok(StereoFrame { time_s, left, right }.into())
-            },
-        );
+    let folder = ResultFolder::create(&plan.out)?;
+    plan.maps.folders(&plan.out)?;
+    let session = Session {
+        rig: pair.rig,
+        config: &plan.config,
+        frames: 0,
+        masks: unseen(rectifier.as_ref()),
+        tracks: false,
+        // Progress would stand between the lines of whoever looks at both.
+        progress: frames_bar(0, true),
+    };
+    let frames = PipedFrames { unread: Mutex::new((Some(first), pairs)), rectifier, rate_hz: input.rate_hz };
+    let outcome = session.run(
+        None,
+        &stop_signal("frame"),
+        |k| frames.fetch(k),
+        |frame| {
+            let mut stdout = terminal::stdout();
+            writeln!(stdout, "{}", line(frame))?;
+            stdout.flush()?;
+            let (Some(dense), Some(index)) = (&frame.motion.dense, frame.reference_index) else {
+                return Ok(());
+            };
+            plan.maps.write(&plan.out, index, dense, &pair.rig)
+        },
+    )?;
+    write_results(plan, &session, &folder, &outcome)?;
+    Ok(Ending::of(outcome.complete))
+}
+
+fn write_results(
+    plan: &RunPlan,
+    session: &Session<'_>,
+    folder: &ResultFolder,
+    outcome: &Outcome,
+) -> Result<()> {
+    let (config, rig) = (&plan.config, &session.rig);
+    write_motion(folder, config, outcome, plan.parquet)?;
+    let summary = Summary::new(NAME.into(), *rig, config, outcome);
+    folder.write_json("summary.json", &summary)?;
+    let description = RunDescription {
+        title: "How the camera moved: frames from standard input",
+        source: NAME,
+        command: terminal::command_line(),
+        config,
+        rig,
+        input: InputKind::Stereo,
+        notes: summary.warnings.clone(),
+    };
+    write_report(folder, &description, outcome)
+}
+
+/// Frames as they are piped in, one after the other.
+struct PipedFrames {
+    /// The first pair, which was read to know its size, and those after it.
+    unread: Mutex<(Option<(Image, Image)>, ImagePairs<Stdin>)>,
+    rectifier: Option<Rectifier>,
+    rate_hz: f64,
+}
+
+impl PipedFrames {
+    /// The k-th frame, rectified; `None` at the end of the stream.
+    fn fetch(&self, k: usize) -> Option<SourceFrame> {
+        let images = self.next_images().transpose()?;
+        let time_s = k as f64 / self.rate_hz;
+        let frame = images
+            .map_err(|error| Unanswered::BadImage(error.to_string()))
+            .and_then(|(left, right)| self.frame(time_s, left, right));
         Some(SourceFrame {
             index: k,
             time_s,
@@ -75,28 +108,23 @@ pub fn run(args: &RunArgs, config: &Config) -> Result<Ending> {
             decode_ms: 0.0,
             bytes: 0,
         })
-    };
-    let outcome = session.run(None, &stop, fetch, |row| {
-        let mut stdout = terminal::stdout();
-        writeln!(stdout, "{}", line(row))?;
-        stdout.flush()?;
-        let (Some(dense), Some(index)) = (&row.motion.dense, row.reference_index) else { return Ok(()) };
-        maps.write(&out, index, dense, &pair.rig)
-    })?;
-    folder.write_motion(config, &outcome, args.parquet)?;
-    let summary = Summary::new(NAME.0.into(), pair.rig, config, &outcome);
-    folder.write_json("summary.json", &summary)?;
-    let about = About {
-        title: "How the camera moved: frames from standard input",
-        source: NAME.0,
-        command: terminal::command_line(),
-        config,
-        rig: &pair.rig,
-        eyes: Eyes::Stereo,
-        notes: summary.warnings.clone(),
-    };
-    folder.write_report(&about, &outcome)?;
-    Ok(if outcome.complete { Ending::Done } else { Ending::Interrupted })
+    }
+
+    fn next_images(&self) -> Result<Option<(Image, Image)>, IoError> {
+        // A poisoned lock means that the reading thread has failed: the stream ends.
+        let Ok(mut unread) = self.unread.lock() else { return Ok(None) };
+        let (first, pairs) = &mut *unread;
+        match first.take() {
+            Some(first) => Ok(Some(first)),
+            None => pairs.next(),
+        }
+    }
+
+    fn frame(&self, time_s: f64, left: Image, right: Image) -> Result<Frame, Unanswered> {
+        let left = rectified(self.rectifier.as_ref().map(Rectifier::left), left)?;
+        let right = rectified(self.rectifier.as_ref().map(Rectifier::right), right)?;
+        Ok(StereoFrame { time_s, left, right }.into())
+    }
 }
 
 fn rectified(map: Option<&RectificationMap>, raw: Image) -> Result<Image, Unanswered> {
@@ -106,16 +134,16 @@ fn rectified(map: Option<&RectificationMap>, raw: Image) -> Result<Image, Unansw
         return Ok(out);
     }
     let ((w, h), (wc, hc)) = (raw.size(), map.raw_size());
-    Err(Unanswered::BadImage(format!("{}: {w}x{h} pixels, but the camera's images have {wc}x{hc}", NAME.0)))
+    Err(Unanswered::BadImage(format!("{NAME}: {w}x{h} pixels, but the camera's images have {wc}x{hc}")))
 }
 
 /// Left and right images in turn, or side by side in one.
-struct Pairs<R> {
+struct ImagePairs<R> {
     images: ImageStream<R>,
     side_by_side: bool,
 }
 
-impl<R: Read> Pairs<R> {
+impl<R: Read> ImagePairs<R> {
     fn next(&mut self) -> Result<Option<(Image, Image)>, IoError> {
         let Some(first) = self.images.next_image()? else { return Ok(None) };
         if !self.side_by_side {
@@ -126,8 +154,8 @@ impl<R: Read> Pairs<R> {
 }
 
 /// One frame's answer.
-fn line(row: &Row) -> Value {
-    let row = motion_row(row);
+fn line(frame: &FrameResult) -> Value {
+    let row = motion_row(frame);
     let finite = |v: f64| v.is_finite().then_some(v);
     let motion = row.motion.as_ref();
     let phi = motion.map(|m| (0..6).map(|i| m.observed[i].then(|| m.phi.mean[i])).collect::<Vec<_>>());

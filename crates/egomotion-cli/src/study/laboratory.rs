@@ -5,24 +5,23 @@ use std::io::Write as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
-use egomotion_study::Study;
-use indicatif::{ProgressBar, ProgressStyle};
-
-use super::table;
-use crate::journal::{Head, Journal, Parts};
-use crate::results::ResultFolder;
-use crate::{Ending, terminal};
 use egomotion_report::chart::number::count;
 use egomotion_report::study::figure;
 use egomotion_report::study::page::{self, Chapter};
+use egomotion_study::Study;
+
+use super::table;
+use crate::exit::Ending;
+use crate::journal::{Journal, JournalHeader, Parts, START_ANEW};
+use crate::results::ResultFolder;
+use crate::terminal::{self, parts_bar};
 
 /// Where studies are run, one after another; their results share a folder and a page.
 pub struct Laboratory {
     folder: ResultFolder,
-    options: Options,
+    options: LaboratoryOptions,
     stop: Arc<AtomicBool>,
     chapters: Vec<Chapter>,
     /// Names of files that are taken, in lower case.
@@ -32,7 +31,7 @@ pub struct Laboratory {
 
 /// How studies are run.
 #[derive(Debug, Clone, Default)]
-pub struct Options {
+pub struct LaboratoryOptions {
     /// Go on where an earlier run was stopped.
     pub resume: bool,
     /// Show no progress.
@@ -44,7 +43,7 @@ pub struct Options {
 }
 
 /// What a study has found.
-struct Found<R> {
+struct DoneParts<R> {
     /// Records of the parts that are done, in their order.
     records: Vec<R>,
     done: usize,
@@ -54,7 +53,7 @@ struct Found<R> {
 
 impl Laboratory {
     /// A laboratory with this folder; it stops after the running part once `stop` is set.
-    pub fn open(out: &Path, options: Options, stop: Arc<AtomicBool>) -> Result<Self> {
+    pub fn open(out: &Path, options: LaboratoryOptions, stop: Arc<AtomicBool>) -> Result<Self> {
         let folder = ResultFolder::create(out)?;
         // The page's name is taken.
         let names = BTreeSet::from([page::NAME.to_owned()]);
@@ -75,10 +74,10 @@ impl Laboratory {
         found.failure.map_or(Ok(()), Err)
     }
 
-    fn run_parts<S: Study>(&self, study: &S, parts: &[String]) -> Result<Found<S::Record>> {
+    fn run_parts<S: Study>(&self, study: &S, parts: &[String]) -> Result<DoneParts<S::Record>> {
         let (mut journal, mut known) = self.journal(study, parts)?;
-        let bar = self.progress(parts.len(), known.len());
-        let mut found = Found { records: Vec::new(), done: 0, failure: None };
+        let bar = parts_bar(parts.len(), known.len(), self.options.quiet);
+        let mut found = DoneParts { records: Vec::new(), done: 0, failure: None };
         for (k, part) in parts.iter().enumerate() {
             if let Some(records) = known.remove(part) {
                 found.records.extend(records);
@@ -109,33 +108,18 @@ impl Laboratory {
     fn journal<S: Study>(&self, study: &S, parts: &[String]) -> Result<(Journal, Parts<S::Record>)> {
         let path = self.folder.path().join(format!("{}.parts.jsonl", study.name()));
         let settings = serde_json::to_value(study).context("the settings cannot be put into JSON")?;
-        let head = Head::new(format!("study {}", study.name()), settings);
+        let header = JournalHeader::new(format!("study {}", study.name()), settings);
         if !self.options.resume {
-            return Ok((Journal::begin(&path, &head)?, Parts::new()));
+            return Ok((Journal::begin(&path, &header)?, Parts::new()));
         }
-        let (journal, known) = Journal::resume(&path, &head)?;
+        let (journal, known) = Journal::resume(&path, &header)?;
         if let Some(name) = known.keys().find(|name| !parts.contains(name)) {
             return Err(anyhow!(
-                "{}: holds the part {name}, which is not of this study any more; run without --resume to start anew",
+                "{}: holds the part {name}, which is not of this study any more; {START_ANEW}",
                 path.display()
             ));
         }
         Ok((journal, known))
-    }
-
-    /// A bar on a terminal, nothing in a pipe.
-    fn progress(&self, parts: usize, known: usize) -> ProgressBar {
-        if self.options.quiet {
-            return ProgressBar::hidden();
-        }
-        let bar = ProgressBar::new(parts as u64).with_position(known as u64);
-        let template = "{wide_msg} {bar:30} {pos}/{len} parts, {eta} left";
-        bar.set_style(
-            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
-        );
-        bar.reset_eta();
-        bar.enable_steady_tick(Duration::from_millis(500));
-        bar
     }
 
     /// Write the files of a study, and the page anew.

@@ -1,6 +1,5 @@
 //! `egomotion study`: the paper's laboratory. Any [`egomotion_study::Study`] becomes files and one page.
 
-mod args;
 mod laboratory;
 mod real;
 mod table;
@@ -13,13 +12,14 @@ use egomotion_study::consistency::{DepthKind, RenderedSensor};
 use egomotion_study::synthetic::MeasurementModel;
 use egomotion_study::{Assumptions, Consistency, Efficiency, LabStudy, OneSetting, Sensitivity, Uncertainty};
 
-use crate::run::set_threads;
-use crate::session::stop_signal;
-use crate::{Ending, terminal};
+use crate::args::study::{
+    ConsistencyArgs, EfficiencyArgs, LaboratoryArgs, PairSensorArg, StudyCommand, TableArgs,
+};
+use crate::exit::Ending;
+use crate::process::set_threads;
+use crate::terminal::{command_line, stop_signal};
 
-pub use args::StudyCommand;
-use args::{ConsistencyArgs, EfficiencyArgs, LaboratoryArgs, PairSensor, TableArgs};
-use laboratory::{Laboratory, Options};
+use laboratory::{Laboratory, LaboratoryOptions};
 
 /// Run what was asked for.
 pub fn study(command: &StudyCommand) -> Result<Ending> {
@@ -29,7 +29,10 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
             alone(&args.laboratory, &sensitivity(&args.laboratory, args.sequences()))
         }
         StudyCommand::Uncertainty(args) => alone(args, &uncertainty(args)),
-        StudyCommand::Real(args) => real::run(args),
+        StudyCommand::Real(args) => match real::recording(args)? {
+            Some(recording) => alone(&args.laboratory, &recording),
+            None => alone(&args.laboratory, &real::rendered(args)),
+        },
         StudyCommand::Assumptions(args) => alone(args, &Assumptions { seed: args.seed }),
         StudyCommand::Consistency(args) => alone(&args.laboratory, &consistency(args)),
         StudyCommand::Efficiency(args) => alone(&args.laboratory, &efficiency(args)),
@@ -80,10 +83,10 @@ fn consistency(args: &ConsistencyArgs) -> Consistency {
         width_px: args.size.0,
         height_px: args.size.1,
         sensor: match args.sensor {
-            PairSensor::Stereo => RenderedSensor::Stereo,
-            PairSensor::Kinect => RenderedSensor::Depth(DepthKind::Kinect),
-            PairSensor::TimeOfFlight => RenderedSensor::Depth(DepthKind::TimeOfFlight),
-            PairSensor::Rendered => RenderedSensor::Depth(DepthKind::Rendered),
+            PairSensorArg::Stereo => RenderedSensor::Stereo,
+            PairSensorArg::Kinect => RenderedSensor::Depth(DepthKind::Kinect),
+            PairSensorArg::TimeOfFlight => RenderedSensor::Depth(DepthKind::TimeOfFlight),
+            PairSensorArg::Rendered => RenderedSensor::Depth(DepthKind::Rendered),
         },
         observe: if args.sparse { Observe::Sparse } else { Observe::Dense },
         pairs: args.laboratory.draws.unwrap_or(own.pairs),
@@ -111,11 +114,11 @@ fn alone<S: egomotion_study::Study>(args: &LaboratoryArgs, study: &S) -> Result<
 /// The laboratory of one study, or of all with a headline of their page.
 fn open(args: &LaboratoryArgs, study: Option<&str>, title: Option<&str>) -> Result<Laboratory> {
     set_threads(args.threads)?;
-    let options = Options {
+    let options = LaboratoryOptions {
         resume: args.resume,
         quiet: args.quiet,
         title: title.map(str::to_owned),
-        command: terminal::command_line().replace(" --resume", ""),
+        command: command_line(),
     };
     Laboratory::open(&args.folder(study), options, stop_signal("part"))
 }

@@ -12,21 +12,20 @@ use egomotion_study::real::{DrawId, MatchingSettings, RealError, RealRecord, Tri
 use egomotion_study::{LabStudy, Publication, Study};
 use serde::Serialize;
 
-use super::alone;
-use super::args::RealArgs;
-use crate::{Ending, Usage};
+use crate::args::study::RealArgs;
+use crate::exit::UsageError;
 
-/// Pixels between two observations of φ in a recording.
-const SAMPLE_STEP_PX: usize = 4;
+/// Pixels between two observations of φ in a recording, whose images are larger than the rendered ones: with fewer a
+/// study takes longer, with more the estimate rests on fewer equations.
+const RECORDING_SAMPLE_STEP_PX: usize = 4;
 
-/// Run what was typed.
-pub fn run(args: &RealArgs) -> Result<Ending> {
-    let Some(source) = &args.source else { return alone(&args.laboratory, &lab(args)) };
-    let recording = RecordingStudy::open(args, source.clone())?;
-    alone(&args.laboratory, &recording)
+/// The study of a recording; `None` where none was typed.
+pub fn recording(args: &RealArgs) -> Result<Option<RecordingStudy>> {
+    args.source.clone().map(|source| RecordingStudy::open(args, source)).transpose()
 }
 
-fn lab(args: &RealArgs) -> LabStudy {
+/// The study of rendered sequences.
+pub fn rendered(args: &RealArgs) -> LabStudy {
     let own = LabStudy::default();
     LabStudy {
         sequences: args.sequences.clone().unwrap_or(own.sequences),
@@ -43,7 +42,7 @@ fn lab(args: &RealArgs) -> LabStudy {
 
 /// The frames of a recording, three at a time.
 #[derive(Debug, Serialize)]
-struct RecordingStudy {
+pub struct RecordingStudy {
     source: PathBuf,
     name: String,
     rig: StereoRig,
@@ -80,7 +79,7 @@ impl RecordingStudy {
         };
         if frames.len() < 3 {
             let words = format!("{} frames are selected; a draw needs three", frames.len());
-            return Err(Usage(words).into());
+            return Err(UsageError(words).into());
         }
         Ok(Self {
             source: path,
@@ -88,7 +87,7 @@ impl RecordingStudy {
             rig,
             how: MatchingSettings {
                 levels: args.round,
-                sample_step_px: args.sample.unwrap_or(SAMPLE_STEP_PX),
+                sample_step_px: args.sample.unwrap_or(RECORDING_SAMPLE_STEP_PX),
                 seed: args.laboratory.seed,
             },
             stride: args.stride,
@@ -113,7 +112,7 @@ impl RecordingStudy {
 
 /// Why a part of a recording gives no records.
 #[derive(Debug, thiserror::Error)]
-enum RecordingError {
+pub enum RecordingError {
     #[error(transparent)]
     Read(#[from] Unanswered),
     #[error("{0}: the right image is missing")]

@@ -6,13 +6,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use egomotion_report::study::page;
 use egomotion_study::{Axis, Cell, Content, Figure, Line, Panel, Point, Publication, Series, Study, Table};
 use serde::{Deserialize, Serialize};
 use tempfile::TempDir;
 
-use super::laboratory::{Laboratory, Options};
-use crate::Ending;
-use egomotion_report::study::page;
+use super::laboratory::{Laboratory, LaboratoryOptions};
+use crate::exit::Ending;
 
 /// A study of some parts, each with numbers that are hard to keep.
 #[derive(Debug, Clone, Serialize)]
@@ -101,7 +101,11 @@ impl Study for Pendulum {
 
 fn run(study: &Pendulum, out: &Path, resume: bool) -> anyhow::Result<Ending> {
     study.stop.store(false, Ordering::Relaxed);
-    let options = Options { resume, command: "egomotion study pendulum".into(), ..Options::default() };
+    let options = LaboratoryOptions {
+        resume,
+        command: "egomotion study pendulum".into(),
+        ..LaboratoryOptions::default()
+    };
     let mut laboratory = Laboratory::open(out, options, Arc::clone(&study.stop))?;
     laboratory.run(study)?;
     laboratory.close()
@@ -266,7 +270,7 @@ fn a_full_disk_is_named() {
 fn studies_share_a_folder_and_a_page() {
     let folder = TempDir::new().unwrap();
     let study = Pendulum::new();
-    let options = Options { title: Some("All".into()), ..Options::default() };
+    let options = LaboratoryOptions { title: Some("All".into()), ..LaboratoryOptions::default() };
     let mut laboratory = Laboratory::open(folder.path(), options, Arc::clone(&study.stop)).unwrap();
     laboratory.run(&study).unwrap();
     laboratory.run(&Pendulum { stopped_in: Some(2), ..study.clone() }).unwrap();

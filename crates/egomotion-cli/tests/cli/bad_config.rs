@@ -62,6 +62,16 @@ fn combinations_without_meaning_are_refused_with_the_reason() {
     ] {
         assert_refused(&try_run(recording(), &out, options), 2, &[reason]);
     }
+    for (options, reason) in [
+        ("--raw 320x240", "--raw tells how frames on standard input are coded"),
+        ("--side-by-side", "it needs SOURCE -"),
+    ] {
+        assert_refused(&try_run(recording(), &out, options), 2, &[reason]);
+    }
+    for option in [&["--mask", "m.png"][..], &["--start", "1"], &["--reverse"], &["--tracks", "t.csv"]] {
+        let ended = egomotion([&["run", "-", "--calibration", "rig.toml"], option].concat());
+        assert_refused(&ended, 2, &["frames on standard input are taken as they come", option[0]]);
+    }
     // Also when the file says one half of it.
     let file = folder.path().join("settings.toml");
     fs::write(&file, "estimator = \"ls\"\n").unwrap();
@@ -95,6 +105,24 @@ fn a_file_of_settings_is_named_with_its_line() {
     fs::remove_file(&file).unwrap();
     let ended = try_run(recording(), &out, &format!("--config {}", file.display()));
     assert_refused(&ended, 1, &["settings.toml", "cannot read"]);
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_key_of_an_earlier_version_is_refused_with_the_new_name() {
+    let folder = TempDir::new().unwrap();
+    let (file, out) = (folder.path().join("settings.toml"), folder.path().join("out"));
+    for (text, line) in [
+        ("seed = 1\n\n[window]\nwidth_m = 2.0\n", 3),
+        ("window.width_m = 2.0\n", 1),
+        // It comes before an error that follows from it.
+        ("[window]\nno_such_key = 2.0\n", 1),
+    ] {
+        fs::write(&file, text).unwrap();
+        let ended = try_run(recording(), &out, &format!("--config {}", file.display()));
+        let told = format!("settings.toml:{line}: there is no key window any more");
+        assert_refused(&ended, 1, &[&told, "write vehicle instead"]);
+    }
     assert!(!out.exists());
 }
 

@@ -1,6 +1,8 @@
 //! The command's contract, seen from outside: a process, its options, streams, files and exit codes.
 #![allow(missing_docs)]
 
+#[cfg(unix)]
+mod background;
 mod bad_config;
 mod bad_input;
 mod bad_output;
@@ -24,7 +26,5 @@ mod selection;
 mod settings;
 mod simulate;
 mod sources;
-#[cfg(unix)]
-mod stalled;
 mod study;
 mod table;

@@ -8,9 +8,9 @@ use std::process::Command;
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
+use crate::background::{Background, Blocked, frames_in, journal, whole_lines};
 use crate::process::{Ended, assert_refused, egomotion, names, run, summary, try_run};
 use crate::recording::{Copy, FRAMES, recording};
-use crate::stalled::{Blocked, begin, ended, interrupt, journal, kill, wait_for, wait_for_parts};
 use crate::table::motion;
 
 const JOURNAL: &str = "run.parts.jsonl";
@@ -66,13 +66,18 @@ fn whole(copy: &Copy, options: &str) -> std::path::PathBuf {
     place
 }
 
-/// A run that was killed in frame 3.
+/// A run that was killed in frame 3, with the frames before it in its journal.
 fn killed(copy: &Copy, options: &str) {
     let blocked = Blocked::at(copy.file("image_0/000003.png"));
-    let child = begin(&copy.source(), &copy.out(), options);
-    wait_for_parts(&copy.out(), 2);
-    kill(child);
+    let mut running = Background::run(&copy.source(), &copy.out(), options);
+    running.wait_for_frames(&copy.out(), 3);
+    running.kill();
     blocked.restore();
+}
+
+/// The text of a run's journal.
+fn journal_text(out: &Path) -> String {
+    fs::read_to_string(journal(out)).unwrap()
 }
 
 #[test]
@@ -86,7 +91,7 @@ fn a_killed_run_goes_on_to_the_same_files() {
     let out = copy.out();
     assert!(!out.join("motion.csv").exists(), "a killed run has written no results");
     // What a kill in the middle of a write leaves.
-    let half = format!("{}{{\"part\":\"00", journal(&out).unwrap());
+    let half = format!("{}{{\"part\":\"00", journal_text(&out));
     fs::write(out.join(JOURNAL), half).unwrap();
     for place in [&out, &out.join("impact")] {
         fs::write(place.join(".egomotion-Xy12Z3"), "half").unwrap();
@@ -107,13 +112,13 @@ fn an_interrupted_run_goes_on_and_may_be_interrupted_again() {
     let out = copy.out();
     for (frame, resume) in [(2, ""), (4, "--resume --threads 1")] {
         let blocked = Blocked::at(copy.file(&format!("image_1/{frame:06}.png")));
-        let child = begin(&copy.source(), &out, &format!("{options} {resume}"));
-        wait_for(|| out.join(format!("impact_hi/{:06}.pfm", frame - 2)).exists());
-        interrupt(&child);
+        let mut running = Background::run(&copy.source(), &out, &format!("{options} {resume}"));
+        running.wait_for_file(&out.join(format!("impact_hi/{:06}.pfm", frame - 2)));
+        running.interrupt();
+        running.wait_for_message("stopping after this frame");
         // The frame that is read when the signal comes is read to its end.
-        std::thread::sleep(std::time::Duration::from_millis(300));
         blocked.write();
-        let ended = ended(child);
+        let ended = running.ended();
         assert_eq!(ended.code, 130, "{}", ended.stderr);
         assert!(ended.stderr.contains("the same command with --resume goes on"), "{}", ended.stderr);
         let summary = summary(&out);
@@ -131,14 +136,14 @@ fn an_interrupted_run_goes_on_and_may_be_interrupted_again() {
 fn a_second_ctrl_c_stops_at_once_and_what_is_done_is_kept() {
     let copy = Copy::new();
     let blocked = Blocked::at(copy.file("image_0/000003.png"));
-    let child = begin(&copy.source(), &copy.out(), "--quiet --observe sparse");
-    wait_for_parts(&copy.out(), 2);
-    interrupt(&child);
-    std::thread::sleep(std::time::Duration::from_millis(300));
-    interrupt(&child);
-    let ended = ended(child);
+    let mut running = Background::run(&copy.source(), &copy.out(), "--quiet --observe sparse");
+    running.wait_for_frames(&copy.out(), 3);
+    running.interrupt();
+    running.wait_for_message("a second Ctrl-C stops at once");
+    running.interrupt();
+    let ended = running.ended();
     assert_eq!(ended.code, 130, "{}", ended.stderr);
-    assert!(ended.stderr.contains("a second Ctrl-C stops at once"), "{}", ended.stderr);
+    assert_eq!(frames_in(&whole_lines(&journal(&copy.out()))), 3);
     blocked.restore();
     run(&copy.source(), &copy.out(), "--quiet --observe sparse --resume");
     assert_eq!(motion(&copy.out()).len(), FRAMES - 1);
@@ -158,17 +163,13 @@ fn a_run_without_space_goes_on_when_there_is_some() {
     let copy = Copy::new();
     let options = "--quiet --observe sparse";
     let whole = whole(&copy, options);
-    // The size of the journal when three frames are done.
+    // Space for the head and the first part, which holds the first frame alone, and not for four frames more.
     killed(&copy, options);
-    let blocks = fs::metadata(copy.out().join(JOURNAL)).unwrap().len() / 512;
+    let first = whole_lines(&journal(&copy.out())).iter().take(2).map(String::len).sum::<usize>();
+    let blocks = first / 512 + 2;
     fs::remove_dir_all(copy.out()).unwrap();
     for resume in ["", "--resume"] {
-        let ended = with_little_space(
-            &copy.source(),
-            &copy.out(),
-            &format!("{options} {resume}"),
-            blocks as usize - 1,
-        );
+        let ended = with_little_space(&copy.source(), &copy.out(), &format!("{options} {resume}"), blocks);
         assert_refused(&ended, 1, &[JOURNAL, "cannot write"]);
         assert!(!copy.out().join("summary.json").exists());
     }
@@ -195,8 +196,8 @@ fn tracks_go_on_too() {
     fs::rename(&out, &whole).unwrap();
     // Space for some frames and not for all.
     assert_refused(&with_little_space(recording(), &out, &options, 40), 1, &[JOURNAL, "cannot write"]);
-    let parts = journal(&out).unwrap().lines().count();
-    assert!((3..6).contains(&parts), "a head, and some frames: {parts} lines");
+    let frames = frames_in(&whole_lines(&journal(&out)));
+    assert!((1..5).contains(&frames), "some frames, not all: {frames}");
     run(recording(), &out, &format!("{options} --resume"));
     assert_same(&out, &whole);
 }
@@ -206,10 +207,10 @@ fn another_run_is_refused_and_told_what_differs() {
     let copy = Copy::new();
     killed(&copy, "--quiet --observe sparse");
     let (source, out) = (copy.source(), copy.out());
-    let before = journal(&out).unwrap();
+    let before = journal_text(&out);
     let refused = |source: &Path, options: &str, parts: &[&str]| {
         assert_refused(&try_run(source, &out, &format!("--quiet --resume {options}")), 1, parts);
-        assert_eq!(journal(&out).unwrap(), before, "{options}: it is left as it was");
+        assert_eq!(journal_text(&out), before, "{options}: it is left as it was");
     };
     let same = "--observe sparse";
     refused(&source, "", &["other settings", "config.observe was sparse and is dense", "without --resume"]);
@@ -245,13 +246,13 @@ fn another_run_is_refused_and_told_what_differs() {
 fn a_recording_that_was_changed_is_refused() {
     let copy = Copy::new();
     killed(&copy, "--quiet --observe sparse");
-    let before = journal(&copy.out()).unwrap();
+    let before = journal_text(&copy.out());
     let change = |name: &str, change: &dyn Fn(String) -> Vec<u8>, parts: &[&str]| {
         let old = fs::read(copy.file(name)).unwrap();
         fs::write(copy.file(name), change(String::from_utf8_lossy(&old).into_owned())).unwrap();
         let ended = try_run(&copy.source(), &copy.out(), "--quiet --observe sparse --resume");
         assert_refused(&ended, 1, parts);
-        assert_eq!(journal(&copy.out()).unwrap(), before);
+        assert_eq!(journal_text(&copy.out()), before);
         fs::write(copy.file(name), old).unwrap();
     };
     let image = fs::read(copy.file("image_0/000004.png")).unwrap();
@@ -330,9 +331,9 @@ fn scenes_that_are_done_are_not_done_again() {
     run(&source, &out, "--quiet");
     fs::rename(&out, &whole).unwrap();
     let blocked = Blocked::at(source.join("image_1/000002_11.png"));
-    let child = begin(&source, &out, "--quiet");
-    wait_for_parts(&out, 2);
-    kill(child);
+    let mut running = Background::run(&source, &out, "--quiet");
+    running.wait_for_parts(&journal(&out), 2);
+    running.kill();
     blocked.restore();
     let done = || fs::metadata(out.join("000000/report.html")).unwrap().modified().unwrap();
     let before = done();
@@ -358,10 +359,10 @@ fn pairs_of_one_time_that_are_done_are_not_done_again() {
     run(&source, &out, "--quiet");
     fs::rename(&out, &whole).unwrap();
     let blocked = Blocked::at(source.join("two/im6.png"));
-    let child = begin(&source, &out, "--quiet");
-    wait_for(|| out.join("one/summary.json").exists());
-    wait_for_parts(&out, 1);
-    kill(child);
+    let mut running = Background::run(&source, &out, "--quiet");
+    running.wait_for_file(&out.join("one/summary.json"));
+    running.wait_for_parts(&journal(&out), 1);
+    running.kill();
     blocked.restore();
     let ended = run(&source, &out, "--quiet --resume");
     assert!(ended.stdout.contains("two: ") && !ended.stdout.contains("one: "), "{}", ended.stdout);

@@ -328,23 +328,17 @@ fn a_sequence_replaces_its_own_files_and_no_longer_one() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_simulation_leaves_whole_frames() {
-    use std::process::{Command, Stdio};
-    use std::time::{Duration, Instant};
+    use std::ffi::OsStr;
+
+    use crate::background::Background;
     let place = TempDir::new().unwrap();
     let out = place.path().join("out");
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("egomotion"));
-    // Longer than any machine takes until the signal: the still camera never meets a wall.
-    command
-        .args(["simulate", "--sequence", "still", "--frames", "5000", "--size", "160x120", "--out"])
-        .arg(&out);
-    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let started = Instant::now();
-    while !out.join("truth/flow/000002.flo").exists() {
-        assert!(started.elapsed() < Duration::from_secs(60), "nothing is written");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    let ended = Ended::of(child.wait_with_output().unwrap());
+    // More frames than any machine renders until the signal; the still camera never meets a wall.
+    let options = ["simulate", "--sequence", "still", "--frames", "5000", "--size", "160x120", "--out"];
+    let mut running = Background::begin(options.iter().map(OsStr::new).chain([out.as_os_str()]));
+    running.wait_for_file(&out.join("truth/flow/000002.flo"));
+    running.interrupt();
+    let ended = running.ended();
     assert_eq!(ended.code, 130, "{}", ended.stderr);
     let source = Source::open(&out).unwrap();
     let frames = &source.sequences[0].frames;

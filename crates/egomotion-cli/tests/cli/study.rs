@@ -2,14 +2,15 @@
 #![cfg(unix)]
 
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
 
-use assert_cmd::cargo::cargo_bin;
-
+use crate::background::{Background, whole_lines};
 use crate::process::{Ended, assert_refused, egomotion, names};
+
+/// The journal of the study.
+const JOURNAL: &str = "table.parts.jsonl";
 
 /// Three parts.
 const OPTIONS: &str = "study table --sequence C --features 200 --draws 21 --seed 5";
@@ -57,20 +58,11 @@ fn a_study_that_was_stopped_and_resumed_differs_in_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let [whole, stopped] = ["whole", "stopped"].map(|name| folder.path().join(name));
     done(&format!("{OPTIONS} --threads 1"), &whole);
-
-    let mut command = Command::new(cargo_bin!("egomotion"));
-    command.args(OPTIONS.split_whitespace()).arg("--out").arg(&stopped);
-    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let journal = stopped.join("table.parts.jsonl");
-    let started = Instant::now();
-    let lines = |path: &Path| fs::read_to_string(path).map_or(0, |text| text.lines().count());
-    while lines(&journal) < 2 {
-        assert!(started.elapsed() < Duration::from_secs(120), "no part ends");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-    let ended = Ended::of(child.wait_with_output().unwrap());
-    assert_eq!(ended.code, 130, "{}", ended.stderr);
+    // What a study leaves that was stopped after its first part.
+    let lines = whole_lines(&whole.join(JOURNAL));
+    assert_eq!(lines.len(), 1 + 3);
+    fs::create_dir(&stopped).unwrap();
+    fs::write(stopped.join(JOURNAL), lines[..2].concat()).unwrap();
 
     let other = call(&format!("{OPTIONS} --resume --std 0.25"), &stopped);
     assert_refused(&other, 1, &["std_disp_px", "--resume"]);
@@ -78,6 +70,23 @@ fn a_study_that_was_stopped_and_resumed_differs_in_nothing() {
     for file in ["table.csv", "table-bound.csv"] {
         assert_eq!(fs::read(whole.join(file)).unwrap(), fs::read(stopped.join(file)).unwrap(), "{file}");
     }
+}
+
+#[test]
+fn an_interrupted_study_writes_the_parts_that_are_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    // More draws than any machine makes until the signal.
+    let options = "study table --sequence C --features 100 --draws 1000000 --out";
+    let mut running = Background::begin(options.split_whitespace().map(OsStr::new).chain([out.as_os_str()]));
+    running.wait_for_parts(&out.join(JOURNAL), 1);
+    running.interrupt();
+    let ended = running.ended();
+    assert_eq!(ended.code, 130, "{}", ended.stderr);
+    assert!(ended.stderr.contains("stopping after this part"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("the same command with --resume goes on"), "{}", ended.stderr);
+    assert!(fs::read_to_string(out.join("page.html")).unwrap().contains("The same command with --resume"));
+    assert!(out.join("table.csv").exists());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::plot::extent;
+use super::axes::extent;
 
 /// A colour: red, green, blue.
 pub type Rgb = [u8; 3];
@@ -21,8 +21,8 @@ pub const CIVIDIS: ColourMap = ColourMap(&[
     0x00224e, 0x123570, 0x3b496c, 0x575d6d, 0x707173, 0x8a8678, 0xa59c74, 0xc3b369, 0xe1cc55, 0xfee838,
 ]);
 
-/// Inferno (matplotlib) from bright to dark: what is urgent glows.
-pub const EMBER: ColourMap = ColourMap(&[
+/// Inferno (matplotlib) reversed, from bright to dark: what is urgent glows.
+pub const INFERNO_REVERSED: ColourMap = ColourMap(&[
     0xfcffa4, 0xf7d13d, 0xfb9b06, 0xed6925, 0xcf4446, 0xa52c60, 0x781c6d, 0x4a0c6b, 0x1b0c41, 0x000004,
 ]);
 
@@ -46,7 +46,7 @@ impl ColourMap {
     }
 
     /// The map as a CSS gradient from left to right.
-    pub fn css_gradient(&self) -> String {
+    pub(crate) fn css_gradient(&self) -> String {
         let mut css = String::from("linear-gradient(90deg");
         for stop in self.0 {
             // Writing to a string cannot fail.
@@ -57,9 +57,9 @@ impl ColourMap {
     }
 }
 
-/// How a quantity is spread over a colour map.
+/// How the values of a quantity are placed on a colour map.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Spread {
+pub enum ColourScaling {
     /// Evenly.
     Linear,
     /// Evenly on both sides of zero, which is the map's middle.
@@ -68,19 +68,19 @@ pub enum Spread {
     Logarithmic,
 }
 
-impl Spread {
+impl ColourScaling {
     /// The value as it is spread: itself, or its logarithm.
     pub fn coordinate(self, value: f64) -> f64 {
         if self == Self::Logarithmic { value.ln() } else { value }
     }
 
     /// The value of a coordinate.
-    pub fn value(self, coordinate: f64) -> f64 {
+    pub(crate) fn value(self, coordinate: f64) -> f64 {
         if self == Self::Logarithmic { coordinate.exp() } else { coordinate }
     }
 
     /// One range of coordinates for the ranges of many pictures.
-    pub fn common(self, ranges: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
+    pub(crate) fn common(self, ranges: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
         let (mut lows, mut highs): (Vec<f64>, Vec<f64>) = ranges.unzip();
         lows.sort_unstable_by(f64::total_cmp);
         highs.sort_unstable_by(f64::total_cmp);
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn sequential_maps_grow_steadily_in_lightness() {
         let light = |[r, g, b]: Rgb| 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
-        for (map, sign) in [(VIRIDIS, 1.0), (CIVIDIS, 1.0), (EMBER, -1.0)] {
+        for (map, sign) in [(VIRIDIS, 1.0), (CIVIDIS, 1.0), (INFERNO_REVERSED, -1.0)] {
             let levels: Vec<f64> = (0..=50).map(|k| sign * light(map.at(f64::from(k) / 50.0))).collect();
             assert!(levels.windows(2).all(|w| w[1] > w[0]), "{levels:?}");
         }
@@ -125,13 +125,13 @@ mod tests {
     #[test]
     fn one_range_for_all_pictures() {
         let ranges = [(1.0, 4.0), (2.0, 5.0), (-900.0, 1e9)];
-        assert_eq!(Spread::Linear.common(ranges.into_iter()), (1.0, 5.0));
-        assert_eq!(Spread::Symmetric.common(ranges.into_iter()), (-5.0, 5.0));
-        assert_eq!(Spread::Linear.common(std::iter::empty()), (0.0, 1.0));
+        assert_eq!(ColourScaling::Linear.common(ranges.into_iter()), (1.0, 5.0));
+        assert_eq!(ColourScaling::Symmetric.common(ranges.into_iter()), (-5.0, 5.0));
+        assert_eq!(ColourScaling::Linear.common(std::iter::empty()), (0.0, 1.0));
         // There and back again.
         let ways = [(-12.0, -11.0), (11.0, 12.0)].into_iter().cycle().take(32);
-        assert_eq!(Spread::Symmetric.common(ways), (-12.0, 12.0));
-        let (low, high) = Spread::Linear.common([(3.0, 3.0)].into_iter());
+        assert_eq!(ColourScaling::Symmetric.common(ways), (-12.0, 12.0));
+        let (low, high) = ColourScaling::Linear.common([(3.0, 3.0)].into_iter());
         assert!(low <= 3.0 && 3.0 < high);
     }
 }

@@ -8,12 +8,12 @@ const STYLE: &str = include_str!("page.css");
 const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'";
 
 /// A page of this title and body; `style` has the rules for its own parts.
-pub fn document(title: &str, style: &str, body: &Markup) -> String {
+pub(crate) fn document(title: &str, style: &str, body: &Markup) -> String {
     page(title, style, POLICY, body)
 }
 
 /// The same, whose body may hold scripts.
-pub fn scripted_document(title: &str, style: &str, body: &Markup) -> String {
+pub(crate) fn scripted_document(title: &str, style: &str, body: &Markup) -> String {
     page(title, style, &format!("{POLICY}; script-src 'unsafe-inline'"), body)
 }
 

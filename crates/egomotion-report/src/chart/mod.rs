@@ -1,7 +1,7 @@
-//! What every chart and page of this command is made of: scales, colours, numbers, small pictures, one look.
+//! What every chart and page is made of: axes, colours, numbers, small pictures, one look.
 
+pub(crate) mod axes;
 pub mod colour;
-pub mod document;
+pub(crate) mod document;
 pub mod number;
-pub mod plot;
-pub mod raster;
+pub(crate) mod raster;

@@ -2,7 +2,7 @@
 
 /// A value in a unit that suits it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unit {
+pub(crate) struct Unit {
     /// What to multiply metres or radians by.
     pub factor: f64,
     /// Its sign.
@@ -11,7 +11,7 @@ pub struct Unit {
 
 impl Unit {
     /// A value that is in this unit already, with the unit's sign.
-    pub fn show(&self, value: f64, digits: i32) -> String {
+    pub(crate) fn show(&self, value: f64, digits: i32) -> String {
         // The degree sign follows its number without a space.
         let space = if self.name == DEGREES.name { "" } else { "\u{a0}" };
         format!("{}{space}{}", significant(value, digits), self.name)
@@ -19,10 +19,10 @@ impl Unit {
 }
 
 /// Degrees, from radians.
-pub const DEGREES: Unit = Unit { factor: 180.0 / std::f64::consts::PI, name: "°" };
+pub(crate) const DEGREES: Unit = Unit { factor: 180.0 / std::f64::consts::PI, name: "°" };
 
 /// Millimetres, metres or kilometres, whichever suits lengths up to `largest_m`.
-pub fn length(largest_m: f64) -> Unit {
+pub(crate) fn length(largest_m: f64) -> Unit {
     match largest_m {
         m if m < 0.5 => Unit { factor: 1e3, name: "mm" },
         m if m < 5e3 || !m.is_finite() => Unit { factor: 1.0, name: "m" },
@@ -31,7 +31,7 @@ pub fn length(largest_m: f64) -> Unit {
 }
 
 /// `value` to `digits` significant digits, with a true minus sign; a dash if it is not finite.
-pub fn significant(value: f64, digits: i32) -> String {
+pub(crate) fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return "–".into();
     }
@@ -45,7 +45,7 @@ pub fn significant(value: f64, digits: i32) -> String {
 }
 
 /// `value` with that many decimals and a true minus sign; a dash if it is not finite.
-pub fn fixed(value: f64, decimals: usize) -> String {
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return "–".into();
     }
@@ -59,7 +59,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 }
 
 /// The label of a tick: with that many decimals, or as 2·10⁻⁶ where that would be long.
-pub fn tick(value: f64, decimals: usize) -> String {
+pub(crate) fn tick(value: f64, decimals: usize) -> String {
     let exponent = if value == 0.0 { 0 } else { value.abs().log10().floor() as i32 };
     if value == 0.0 || (decimals <= 4 && exponent < 6) || !value.is_finite() {
         return fixed(value, if value == 0.0 && decimals > 4 { 0 } else { decimals });
@@ -88,7 +88,7 @@ fn superscript(digit: char) -> char {
 }
 
 /// `value ± sigma`, both with the decimals that show two digits of σ, at most six.
-pub fn with_sigma(value: f64, sigma: f64) -> String {
+pub(crate) fn with_sigma(value: f64, sigma: f64) -> String {
     if !(sigma.is_finite() && sigma > 0.0) {
         return significant(value, 4);
     }

@@ -4,11 +4,11 @@ use egomotion::geometry::Grid;
 
 use super::colour::Rgb;
 
-/// Level of deflate: the next ones take twice the time for a few percent.
-const DEFLATE: u8 = 3;
+/// Level of deflate, 1 to 9: the next ones take twice the time for a few percent.
+const DEFLATE_LEVEL: u8 = 3;
 
 /// A plane of at most `most` columns, each pixel the one amid the block it stands for: never a mixture of two surfaces.
-pub fn centres(plane: &Grid<f32>, most: usize) -> Grid<f64> {
+pub(crate) fn centres(plane: &Grid<f32>, most: usize) -> Grid<f64> {
     let (small, rows) = reduced(plane.size(), most);
     let amid = |n: usize, of: usize| (0..n).map(|i| (2 * i + 1) * of / (2 * n)).collect::<Vec<_>>();
     let (columns, lines) = (amid(small, plane.width()), amid(rows, plane.height()));
@@ -16,7 +16,7 @@ pub fn centres(plane: &Grid<f32>, most: usize) -> Grid<f64> {
 }
 
 /// A plane of at most `most` columns, each pixel the mean of what is finite in the block it stands for, or 0.
-pub fn means(plane: &Grid<f32>, most: usize) -> Grid<f64> {
+pub(crate) fn means(plane: &Grid<f32>, most: usize) -> Grid<f64> {
     let (small, rows) = reduced(plane.size(), most);
     let blocks =
         |n: usize, of: usize| (0..n).map(|i| i * of / n..((i + 1) * of).div_ceil(n)).collect::<Vec<_>>();
@@ -37,12 +37,12 @@ fn reduced((width, height): (usize, usize), most: usize) -> (usize, usize) {
 }
 
 /// A grey PNG, or one in the colours of a palette whose entry 0 is transparent; `None` if it is empty.
-pub fn encode(pixels: &Grid<u8>, palette: Option<&[Rgb]>) -> Option<Vec<u8>> {
+pub(crate) fn encode(pixels: &Grid<u8>, palette: Option<&[Rgb]>) -> Option<Vec<u8>> {
     let (width, height) = (u32::try_from(pixels.width()).ok()?, u32::try_from(pixels.height()).ok()?);
     let mut content = Vec::new();
     let mut encoder = png::Encoder::new(&mut content, width, height);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_deflate_compression(png::DeflateCompression::Level(DEFLATE));
+    encoder.set_deflate_compression(png::DeflateCompression::Level(DEFLATE_LEVEL));
     if let Some(palette) = palette {
         encoder.set_color(png::ColorType::Indexed);
         encoder.set_palette([&[[0; 3]], palette].concat().as_flattened().to_vec());
@@ -59,7 +59,7 @@ pub fn encode(pixels: &Grid<u8>, palette: Option<&[Rgb]>) -> Option<Vec<u8>> {
 }
 
 /// A PNG made by [`encode`] with another palette, entry 0 included; `None` if it has none of that length.
-pub fn recolour(png: &[u8], palette: &[Rgb]) -> Option<Vec<u8>> {
+pub(crate) fn recolour(png: &[u8], palette: &[Rgb]) -> Option<Vec<u8>> {
     let colours = palette.as_flattened();
     let name = png.windows(4).position(|chunk| chunk == b"PLTE")?;
     let length = u32::try_from(colours.len()).ok()?.to_be_bytes();

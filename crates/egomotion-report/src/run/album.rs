@@ -3,15 +3,16 @@
 use super::pictures::FramePictures;
 
 /// Most frames of which a page shows pictures: a step of the slider is then still narrower than the thumb.
-const MOST_FRAMES: usize = 48;
+const MAX_FRAMES: usize = 48;
 
-/// Most frames a picture that an album begins with: a run may end early.
-const WIDEST_START: usize = 8;
+/// Largest stride that an album begins with, in frames a picture: a run that ends early still has some.
+const MAX_FIRST_STRIDE: usize = 8;
 
 /// Most bytes of pictures: the page holds 4/3 of them, as text.
-const MOST_BYTES: usize = 5_600_000;
+const MAX_BYTES: usize = 5_600_000;
 
-/// Bytes that all pictures of a frame need for each pixel of one, about; the limit above holds whatever they are.
+/// Bytes that all pictures of a frame need for each pixel of one, about: a larger value makes the pictures smaller. The
+/// limit above holds whatever they need.
 const BYTES_PER_PIXEL: f64 = 1.5;
 
 /// Least and greatest width of a picture, in pixels.
@@ -30,14 +31,14 @@ pub struct Album {
 impl Album {
     /// An album of a run of about so many frames.
     pub fn of(frames: usize) -> Self {
-        let stride = frames.div_ceil(MOST_FRAMES).next_power_of_two().min(WIDEST_START);
+        let stride = frames.div_ceil(MAX_FRAMES).next_power_of_two().min(MAX_FIRST_STRIDE);
         Self { pictures: Vec::new(), expected: frames.div_ceil(stride), stride, offered: 0 }
     }
 
     /// How wide to make pictures of images of `(width, height)`, so that those of all frames fit.
     pub fn width_px(&self, (width, height): (usize, usize)) -> usize {
-        let pictures = self.expected.clamp(1, MOST_FRAMES) as f64;
-        let pixels = MOST_BYTES as f64 / pictures / BYTES_PER_PIXEL;
+        let pictures = self.expected.clamp(1, MAX_FRAMES) as f64;
+        let pixels = MAX_BYTES as f64 / pictures / BYTES_PER_PIXEL;
         let fits = (pixels * width as f64 / height.max(1) as f64).sqrt();
         width.min(fits.clamp(WIDTHS_PX.0, WIDTHS_PX.1) as usize)
     }
@@ -54,18 +55,18 @@ impl Album {
         let accepted = self.accepts();
         self.pictures.extend(made.filter(|_| accepted));
         self.offered += 1;
-        while self.bytes() > MOST_BYTES && self.pictures.len() > 1 {
+        while self.bytes() > MAX_BYTES && self.pictures.len() > 1 {
             self.thin();
         }
     }
 
     /// The pictures kept, in order.
-    pub fn pictures(&self) -> &[FramePictures] {
+    pub(crate) fn pictures(&self) -> &[FramePictures] {
         &self.pictures
     }
 
     /// Every so-many-th frame that was offered is kept.
-    pub fn stride(&self) -> usize {
+    pub(crate) fn stride(&self) -> usize {
         self.stride
     }
 
@@ -75,7 +76,7 @@ impl Album {
 
     /// Whether it is the next frame's turn; room is made for it.
     fn accepts(&mut self) -> bool {
-        if self.pictures.len() == MOST_FRAMES && self.is_due() {
+        if self.pictures.len() == MAX_FRAMES && self.is_due() {
             self.thin();
         }
         self.is_due()

@@ -3,17 +3,18 @@
 use egomotion::metrics::quantile;
 use maud::{Markup, html};
 
-use super::Interval;
-use super::series::{Series, Timeline};
-use crate::chart::plot::{Axes, MARGIN, Scale, band, extent, path};
+use super::interval::Interval;
+use super::time_series::TimeSeries;
+use super::timeline::Timeline;
+use crate::chart::axes::{Axes, AxisScale, MARGIN, band, extent, path};
 
-/// Width and height of a small chart, in SVG units, which are pixels on a phone.
-pub const SMALL: (f64, f64) = (340.0, 180.0);
-/// The same of the chart of errors below it.
-pub const LOW: (f64, f64) = (340.0, 100.0);
+/// Width and height of the chart of one component, in SVG units, which are pixels on a phone.
+pub(crate) const COMPONENT_CHART_SIZE: (f64, f64) = (340.0, 180.0);
+/// Width and height of the chart of its errors below it, in SVG units.
+pub(crate) const ERROR_CHART_SIZE: (f64, f64) = (340.0, 100.0);
 
 /// One series over time; `y` is made by the caller so that charts may share it.
-pub fn chart(timeline: &Timeline<'_>, series: &Series, axes: &Axes, size: (f64, f64)) -> Markup {
+pub(crate) fn chart(timeline: &Timeline<'_>, series: &TimeSeries, axes: &Axes, size: (f64, f64)) -> Markup {
     let clip = format!("clip-{}", series.id);
     let [left, top, width, height] = axes.inside();
     let ticks = if size.1 < 150.0 { 3 } else { 5 };
@@ -36,17 +37,17 @@ pub fn chart(timeline: &Timeline<'_>, series: &Series, axes: &Axes, size: (f64, 
 }
 
 /// Axes over time with a linear ordinate.
-pub fn axes(timeline: &Timeline<'_>, range: (f64, f64), size: (f64, f64)) -> Axes {
-    Axes { x: time_scale(timeline, size), y: Scale::linear(range, (size.1 - MARGIN[3], MARGIN[2])) }
+pub(crate) fn axes(timeline: &Timeline<'_>, range: (f64, f64), size: (f64, f64)) -> Axes {
+    Axes { x: time_scale(timeline, size), y: AxisScale::linear(range, (size.1 - MARGIN[3], MARGIN[2])) }
 }
 
 /// The time axis of a chart.
-pub fn time_scale(timeline: &Timeline<'_>, size: (f64, f64)) -> Scale {
-    Scale::linear(timeline.range, (MARGIN[0], size.0 - MARGIN[1]))
+pub(crate) fn time_scale(timeline: &Timeline<'_>, size: (f64, f64)) -> AxisScale {
+    AxisScale::linear(timeline.range, (MARGIN[0], size.0 - MARGIN[1]))
 }
 
 /// Room for estimates and truth, and for the bands as far as they leave the curve readable.
-pub fn value_range(series: &Series) -> (f64, f64) {
+pub(crate) fn value_range(series: &TimeSeries) -> (f64, f64) {
     let values = series.values.iter().flatten().map(|v| v.value);
     let Some((lo, hi)) = extent(values.chain(series.truths.iter().flatten().copied())) else {
         return (-1.0, 1.0);
@@ -58,14 +59,18 @@ pub fn value_range(series: &Series) -> (f64, f64) {
 }
 
 /// Room on both sides of zero for errors and the usual band.
-pub fn error_range(series: &Series) -> (f64, f64) {
+pub(crate) fn error_range(series: &TimeSeries) -> (f64, f64) {
     let values = series.values.iter().flatten().map(|v: &Interval| v.value.abs());
     let largest = values.filter(|v| v.is_finite()).fold(1.15 * series.usual_band(), f64::max);
     (-1.1 * largest, 1.1 * largest)
 }
 
 /// A curve over time, which starts anew after each gap.
-pub fn line(timeline: &Timeline<'_>, axes: &Axes, values: impl Iterator<Item = Option<f64>>) -> String {
+pub(crate) fn line(
+    timeline: &Timeline<'_>,
+    axes: &Axes,
+    values: impl Iterator<Item = Option<f64>>,
+) -> String {
     path(timeline.times.iter().zip(values).map(|(&t, v)| axes.at(t, v?)))
 }
 
@@ -85,12 +90,12 @@ fn zero(axes: &Axes) -> Markup {
 }
 
 /// The attribute of that name.
-pub fn view_box((width, height): (f64, f64)) -> String {
+pub(crate) fn view_box((width, height): (f64, f64)) -> String {
     format!("0 0 {width} {height}")
 }
 
 /// Ticks on the lower edge where a frame asked for an answer and got none.
-pub fn unanswered(timeline: &Timeline<'_>, axes: &Axes) -> Markup {
+pub(crate) fn unanswered(timeline: &Timeline<'_>, axes: &Axes) -> Markup {
     let [_, top, _, height] = axes.inside();
     let tick = |&t: &f64| Some(format!("M{:.1} {:.1}v-7", axes.x.at(t)?, top + height));
     let ticks: String = timeline.unanswered.iter().filter_map(tick).collect();
@@ -98,10 +103,10 @@ pub fn unanswered(timeline: &Timeline<'_>, axes: &Axes) -> Markup {
 }
 
 /// A line that follows the slider.
-pub fn cursor(timeline: &Timeline<'_>, axes: &Axes) -> Markup {
+pub(crate) fn cursor(timeline: &Timeline<'_>, axes: &Axes) -> Markup {
     let [_, top, _, height] = axes.inside();
     let place = |&t: &f64| axes.x.at(t).map_or("-99".to_owned(), |x| format!("{x:.1}"));
-    let at: Vec<String> = timeline.stops.iter().map(place).collect();
+    let at: Vec<String> = timeline.slider_times.iter().map(place).collect();
     html! {
         @if let Some(first) = at.first() {
             path class="cursor" transform=(format!("translate({first} 0)")) data-x=(at.join(" ")) d=(format!("M0 {top}v{height}")) {}

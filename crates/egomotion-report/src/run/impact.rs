@@ -4,18 +4,20 @@ use egomotion::motion::NoObstacle;
 use maud::{Markup, html};
 
 use super::charts::{cursor, line, time_scale, unanswered, view_box};
-use super::series::{Series, Timeline};
-use super::{FrameRow, Report};
-use crate::chart::plot::{Axes, MARGIN, Scale, extent};
+use super::interval::Interval;
+use super::report::{FrameRow, Report};
+use super::time_series::TimeSeries;
+use super::timeline::Timeline;
+use crate::chart::axes::{Axes, AxisScale, MARGIN, extent};
 
-/// Width and height of the chart, in SVG units.
-const SIZE: (f64, f64) = (400.0, 250.0);
-/// Height of the lane of one reason.
-const LANE: f64 = 15.0;
+/// Width and height of the chart, in SVG units, which are pixels on a phone.
+const CHART_SIZE: (f64, f64) = (400.0, 250.0);
+/// Height of the lane of one reason, in SVG units: its letter fits beside it.
+const LANE_HEIGHT: f64 = 15.0;
 
 /// Time to impact over time.
-pub fn series(timeline: &Timeline<'_>) -> Series {
-    Series {
+pub(crate) fn series(timeline: &Timeline<'_>) -> TimeSeries {
+    TimeSeries {
         id: "impact".into(),
         name: "Time to impact".into(),
         unit: "s".into(),
@@ -34,7 +36,7 @@ fn reason(row: &FrameRow) -> Option<NoObstacle> {
 }
 
 /// The reasons that occur, each with how often among all rows.
-pub fn reasons(rows: &[FrameRow]) -> Vec<(NoObstacle, usize)> {
+pub(crate) fn reasons(rows: &[FrameRow]) -> Vec<(NoObstacle, usize)> {
     let mut reasons: Vec<(NoObstacle, usize)> = Vec::new();
     for why in rows.iter().filter_map(reason) {
         match reasons.iter_mut().find(|(known, _)| *known == why) {
@@ -47,10 +49,14 @@ pub fn reasons(rows: &[FrameRow]) -> Vec<(NoObstacle, usize)> {
 }
 
 /// The chart with a lane below for each reason; `None` if nothing ever approaches.
-pub fn chart(timeline: &Timeline<'_>, series: &Series, reasons: &[(NoObstacle, usize)]) -> Option<Markup> {
+pub(crate) fn chart(
+    timeline: &Timeline<'_>,
+    series: &TimeSeries,
+    reasons: &[(NoObstacle, usize)],
+) -> Option<Markup> {
     let axes = Axes {
-        x: time_scale(timeline, SIZE),
-        y: Scale::log(range(series)?, (SIZE.1 - MARGIN[3], MARGIN[2])),
+        x: time_scale(timeline, CHART_SIZE),
+        y: AxisScale::log(range(series)?, (CHART_SIZE.1 - MARGIN[3], MARGIN[2])),
     };
     let [left, top, width, height] = axes.inside();
     let bars = |open: bool| -> String {
@@ -58,7 +64,7 @@ pub fn chart(timeline: &Timeline<'_>, series: &Series, reasons: &[(NoObstacle, u
         values.filter_map(|(&t, v)| bar(t, (*v).filter(|v| v.high.is_infinite() == open)?, &axes)).collect()
     };
     let bar_px = (0.6 * width / timeline.times.len().max(1) as f64).clamp(1.0, 9.0);
-    let whole = (SIZE.0, SIZE.1 + LANE * reasons.len() as f64);
+    let whole = (CHART_SIZE.0, CHART_SIZE.1 + LANE_HEIGHT * reasons.len() as f64);
     Some(html! {
         svg viewBox=(view_box(whole)) role="img" aria-label="time to impact of the nearest obstacle over time" data-series=(series.id)
             data-inside=(format!("{left:.1} {width:.1}")) data-range=(format!("{:.4} {:.4}", axes.x.range().0, axes.x.range().1)) {
@@ -74,7 +80,7 @@ pub fn chart(timeline: &Timeline<'_>, series: &Series, reasons: &[(NoObstacle, u
                     }
                 }
             }
-            @for (k, (why, _)) in reasons.iter().enumerate() { (lane(timeline, &axes, *why, SIZE.1 + LANE * k as f64 + 2.0, bar_px)) }
+            @for (k, (why, _)) in reasons.iter().enumerate() { (lane(timeline, &axes, *why, CHART_SIZE.1 + LANE_HEIGHT * k as f64 + 2.0, bar_px)) }
             (unanswered(timeline, &axes))
             (cursor(timeline, &axes))
         }
@@ -94,7 +100,7 @@ fn lane(timeline: &Timeline<'_>, axes: &Axes, why: NoObstacle, y: f64, width_px:
 }
 
 /// The letter that stands for a reason in the chart.
-pub fn letter(why: NoObstacle) -> &'static str {
+pub(crate) fn letter(why: NoObstacle) -> &'static str {
     match why {
         NoObstacle::NothingMeasured => "a",
         NoObstacle::NothingApproaches => "b",
@@ -104,7 +110,7 @@ pub fn letter(why: NoObstacle) -> &'static str {
 }
 
 /// How often there was no obstacle, and why; `None` if there always was one.
-pub fn none(report: &Report<'_>, reasons: &[(NoObstacle, usize)]) -> Option<String> {
+pub(crate) fn none(report: &Report<'_>, reasons: &[(NoObstacle, usize)]) -> Option<String> {
     let answered = report.frames.iter().filter(|row| row.motion.is_some()).count();
     let total: usize = reasons.iter().map(|(_, count)| count).sum();
     let listed: Vec<String> =
@@ -113,7 +119,7 @@ pub fn none(report: &Report<'_>, reasons: &[(NoObstacle, usize)]) -> Option<Stri
 }
 
 /// From the earliest to the latest that matters: slow approaches do not press the near ones flat.
-fn range(series: &Series) -> Option<(f64, f64)> {
+fn range(series: &TimeSeries) -> Option<(f64, f64)> {
     let present = || series.values.iter().flatten();
     let (soonest, _) = extent(present().map(|a| a.low))?;
     let (first, last) = extent(present().map(|a| a.value))?;
@@ -123,7 +129,7 @@ fn range(series: &Series) -> Option<(f64, f64)> {
 }
 
 /// A vertical stroke over the interval, to the upper edge where it is open.
-fn bar(time: f64, value: super::Interval, axes: &Axes) -> Option<String> {
+fn bar(time: f64, value: Interval, axes: &Axes) -> Option<String> {
     let (x, low) = axes.at(time, value.low)?;
     let high = if value.high.is_finite() { axes.y.at(value.high)? } else { axes.inside()[1] };
     Some(format!("M{x:.1} {low:.1}V{high:.1}"))

@@ -4,24 +4,26 @@ use egomotion::geometry::PixelBounds;
 use egomotion::pipeline::MovingGroup;
 use maud::{Markup, html};
 
-use super::{FrameRow, Interval, Report, Stop};
+use super::interval::Interval;
+use super::report::{FrameRow, Report};
+use super::slider::SliderPosition;
 use crate::chart::number::significant;
 
-/// Most groups that are outlined in a frame; the largest come first.
-const MOST_GROUPS: usize = 8;
+/// Most groups that are outlined in a frame, the largest first: with more the image is hidden.
+const MAX_GROUPS: usize = 8;
 
 /// Outlines on the image, in its own pixels; the script shows those of one frame.
-pub fn overlay(report: &Report<'_>, stops: &[Stop]) -> Markup {
+pub(crate) fn overlay(report: &Report<'_>, positions: &[SliderPosition]) -> Markup {
     let (width, height) = (report.rig.width_px, report.rig.height_px);
     // Text as large as in a chart when the image is shown small.
     let font = width as f64 / 34.0;
     html! {
         svg class="overlay" viewBox=(format!("0 0 {width} {height}")) aria-hidden="true" style=(format!("font-size:{font:.0}px")) {
-            @for (k, stop) in stops.iter().enumerate() {
-                @if let Some(row) = report.frames.get(stop.row) {
+            @for (k, position) in positions.iter().enumerate() {
+                @if let Some(row) = report.frames.get(position.row) {
                     g data-k=(k) class=(if k == 0 { "on" } else { "" }) {
                         @if let Ok(obstacle) = row.obstacle { (outline("obstacle", obstacle.bounds, "", font)) }
-                        @for (n, group) in row.moving.iter().take(MOST_GROUPS).enumerate() {
+                        @for (n, group) in row.moving.iter().take(MAX_GROUPS).enumerate() {
                             (outline("moving", group.bounds, &(n + 1).to_string(), font))
                         }
                     }
@@ -42,16 +44,16 @@ fn outline(class: &str, bounds: PixelBounds, label: &str, font: f64) -> Markup {
 }
 
 /// The same in words, a list a frame.
-pub fn words(report: &Report<'_>, stops: &[Stop]) -> Markup {
+pub(crate) fn words(report: &Report<'_>, positions: &[SliderPosition]) -> Markup {
     html! {
-        @for (k, stop) in stops.iter().enumerate() {
-            @if let Some(row) = report.frames.get(stop.row) {
+        @for (k, position) in positions.iter().enumerate() {
+            @if let Some(row) = report.frames.get(position.row) {
                 ul data-k=(k) class=(if k == 0 { "on" } else { "" }) {
                     li class=(if row.impact().is_some() { "obstacle" } else { "" }) { (nearest(row)) }
-                    @for (n, group) in row.moving.iter().take(MOST_GROUPS).enumerate() {
+                    @for (n, group) in row.moving.iter().take(MAX_GROUPS).enumerate() {
                         li class="moving" { b { (n + 1) } ": " (moving(row, group)) }
                     }
-                    @if row.moving.len() > MOST_GROUPS { li { "and " (row.moving.len() - MOST_GROUPS) " smaller ones" } }
+                    @if row.moving.len() > MAX_GROUPS { li { "and " (row.moving.len() - MAX_GROUPS) " smaller ones" } }
                 }
             }
         }
@@ -78,7 +80,7 @@ fn moving(row: &FrameRow, group: &MovingGroup) -> String {
 }
 
 /// When something is reached, with its interval.
-pub fn in_seconds(seconds: &Interval) -> String {
+pub(crate) fn in_seconds(seconds: &Interval) -> String {
     let (value, low) = (significant(seconds.value, 3), significant(seconds.low, 3));
     match seconds.high.is_finite() {
         true => format!("in {value} s ({low} … {} s)", significant(seconds.high, 3)),

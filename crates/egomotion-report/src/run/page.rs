@@ -2,46 +2,49 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::series::{Series, Timeline};
-use super::trajectory::Path;
+use super::camera_path::CameraPath;
+use super::report::Report;
+use super::time_series::TimeSeries;
+use super::timeline::Timeline;
 use super::{
-    Report, Stop, body, charts, data, impact, observed, phi, player, summary, tables, trouble, viewer,
+    body_velocity, charts, impact, observability, player, scene_motion, script_data, summary, tables, viewer,
+    warnings,
 };
 use crate::chart::document::scripted_document;
 use crate::chart::number::{fixed, significant};
 
 /// Rules for the parts of this page.
-pub const STYLE: &str = include_str!("page.css");
+pub(crate) const STYLE: &str = include_str!("page.css");
 /// Moves the slider and names values; without it the page shows its first pictures.
 const SCRIPT: &str = include_str!("page.js");
 
-/// Width and height of the chart of heights, in SVG units.
-const HEIGHT_SIZE: (f64, f64) = (400.0, 170.0);
+/// Width and height of the chart of heights, in SVG units, which are pixels on a phone.
+const HEIGHT_CHART_SIZE: (f64, f64) = (400.0, 170.0);
 
 /// The whole page as one HTML document that loads nothing.
 pub fn render(report: &Report<'_>) -> String {
     let timeline = Timeline::of(report);
-    let stops = report.stops();
-    let path = Path::of(report);
-    let body = body::series(&timeline, body::speed_unit(report.frames));
-    let phi = phi::series(&timeline);
+    let positions = report.slider_positions();
+    let path = CameraPath::of(report);
+    let body = body_velocity::velocity_series(&timeline, body_velocity::speed_unit(report.frames));
+    let phi = scene_motion::series(&timeline);
     let impact = impact::series(&timeline);
-    let kept = observed::series(&timeline);
+    let kept = observability::series(&timeline);
     let height = path.height(report, &timeline);
-    let errors: Vec<Series> = phi.iter().filter_map(Series::errors).collect();
-    let named: Vec<&Series> =
+    let errors: Vec<TimeSeries> = phi.iter().filter_map(TimeSeries::errors).collect();
+    let named: Vec<&TimeSeries> =
         body.iter().chain(&phi).chain(&errors).chain([&impact, &kept, &height]).collect();
     let body = html! {
         header {
             p class="kicker" { "egomotion · " (report.source) }
             h1 { (report.title) }
             (summary::lede(report))
-            (summary::figures(report, &path, &body))
-            (troubles(report))
+            (summary::headline_numbers(report, &path, &body))
+            (warning_list(report))
         }
         main {
-            (player::bar(report, &stops))
-            (viewer::viewer(report, &stops))
+            (player::bar(report, &positions))
+            (viewer::viewer(report, &positions))
             div class="pair" {
                 (above(report, &path))
                 div { (heights(report, &timeline, &height)) (impacts(report, &timeline, &impact)) }
@@ -53,30 +56,26 @@ pub fn render(report: &Report<'_>) -> String {
             (repeat(report))
         }
         footer { "Made by egomotion " (env!("CARGO_PKG_VERSION")) ". The numbers are in motion.csv and summary.json beside this page." }
-        @if needs_script(&stops) {
-            script type="application/json" id="data" { (PreEscaped(data::json(&timeline, &named))) }
+        @if !positions.is_empty() {
+            script type="application/json" id="data" { (PreEscaped(script_data::json(&timeline, &named))) }
             script { (PreEscaped(SCRIPT)) }
         }
     };
     scripted_document(&format!("{} – egomotion", report.title), STYLE, &body)
 }
 
-fn needs_script(stops: &[Stop]) -> bool {
-    !stops.is_empty()
-}
-
-fn troubles(report: &Report<'_>) -> Markup {
-    let all = trouble::trouble(report);
+fn warning_list(report: &Report<'_>) -> Markup {
+    let all = warnings::sentences(report);
     html! {
         @if all.is_empty() {
-            @if let Some(well) = trouble::all_well(report) { p class="well" { (well) } }
+            @if let Some(well) = warnings::all_well(report) { p class="well" { (well) } }
         } @else {
             div class="notes" { p { b { "What to know before trusting it" } } ul { @for sentence in &all { li { (sentence) } } } }
         }
     }
 }
 
-fn above(report: &Report<'_>, path: &Path<'_>) -> Markup {
+fn above(report: &Report<'_>, path: &CameraPath<'_>) -> Markup {
     let mut items = vec![("line", "estimate"), ("band", "95 % ellipse")];
     items.extend(report.truth.is_some().then_some(("true", "truth")));
     html! {
@@ -89,13 +88,13 @@ fn above(report: &Report<'_>, path: &Path<'_>) -> Markup {
     }
 }
 
-fn heights(report: &Report<'_>, timeline: &Timeline<'_>, height: &Series) -> Markup {
-    let axes = charts::axes(timeline, charts::value_range(height), HEIGHT_SIZE);
+fn heights(report: &Report<'_>, timeline: &Timeline<'_>, height: &TimeSeries) -> Markup {
+    let axes = charts::axes(timeline, charts::value_range(height), HEIGHT_CHART_SIZE);
     html! {
         section id="height" {
             h2 { "Height above the start " span class="unit" { (height.unit) } }
             (legend(&standard(report)))
-            (charts::chart(timeline, height, &axes, HEIGHT_SIZE))
+            (charts::chart(timeline, height, &axes, HEIGHT_CHART_SIZE))
         }
     }
 }
@@ -109,7 +108,7 @@ fn standard(report: &Report<'_>) -> Vec<(&'static str, &'static str)> {
     items
 }
 
-fn impacts(report: &Report<'_>, timeline: &Timeline<'_>, series: &Series) -> Markup {
+fn impacts(report: &Report<'_>, timeline: &Timeline<'_>, series: &TimeSeries) -> Markup {
     let reasons = impact::reasons(report.frames);
     html! {
         section id="impact" {
@@ -127,27 +126,27 @@ fn impacts(report: &Report<'_>, timeline: &Timeline<'_>, series: &Series) -> Mar
     }
 }
 
-fn velocities(report: &Report<'_>, timeline: &Timeline<'_>, body: &[Series]) -> Markup {
+fn velocities(report: &Report<'_>, timeline: &Timeline<'_>, body: &[TimeSeries]) -> Markup {
     html! {
         section id="velocity" {
             h2 { "How the camera moved, per second" }
             p { "Its own velocity and turning rate, as a driver would name them. The shaded band holds the true value 95 times out of 100; where it cannot be seen it is thinner than the line." }
             (legend(&standard(report)))
-            (body::charts(timeline, body))
+            (body_velocity::charts(timeline, body))
         }
     }
 }
 
-fn determined(report: &Report<'_>, timeline: &Timeline<'_>, kept: &Series) -> Markup {
+fn determined(report: &Report<'_>, timeline: &Timeline<'_>, kept: &TimeSeries) -> Markup {
     html! {
         section id="observed" {
             h2 { "What could be known" }
             p { "Which of the six components of the motion were determined by what was seen, in how many of the answered intervals." }
-            (observed::lanes(report, timeline))
+            (observability::lanes(report, timeline))
             h3 { "Measurements " span class="unit" { (kept.unit) } }
-            @if let Some(sentence) = observed::sentence(report) { p { (sentence) } }
+            @if let Some(sentence) = observability::sentence(report) { p { (sentence) } }
             (legend(&[("line", "kept"), ("all", "all")]))
-            (observed::measurements(timeline, kept))
+            (observability::measurements(timeline, kept))
         }
     }
 }
@@ -167,7 +166,7 @@ fn times(report: &Report<'_>) -> Markup {
     }
 }
 
-fn scene_motion(report: &Report<'_>, timeline: &Timeline<'_>, phi: &[Series]) -> Markup {
+fn scene_motion(report: &Report<'_>, timeline: &Timeline<'_>, phi: &[TimeSeries]) -> Markup {
     let truth = phi.iter().any(|series| series.truths.iter().any(Option::is_some));
     html! {
         section id="phi" {
@@ -178,7 +177,7 @@ fn scene_motion(report: &Report<'_>, timeline: &Timeline<'_>, phi: &[Series]) ->
                 @if truth { " The strip below each chart shows how far off the estimate is, against its own band." }
             }
             (legend(&standard(report)))
-            (phi::charts(timeline, phi))
+            (scene_motion::charts(timeline, phi))
         }
     }
 }

@@ -8,42 +8,47 @@ use jpeg_encoder::{ColorType, Encoder};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::bytes;
-use crate::chart::colour::{CIVIDIS, ColourMap, DIVERGING, EMBER, Rgb, Spread, VIRIDIS};
+use super::base64_text;
+use crate::chart::colour::{CIVIDIS, ColourMap, ColourScaling, DIVERGING, INFERNO_REVERSED, Rgb, VIRIDIS};
 use crate::chart::raster::{centres, encode, means, recolour};
 
-/// Quality of the JPEG pictures of the left image, of 100.
+/// Quality of the JPEG pictures of the left image, 1 to 100: a larger one makes a larger page.
 const JPEG_QUALITY: u8 = 70;
 
-/// Palette entries that hold values; entry 0 is a missing pixel. Few, so that the page stays small.
+/// Palette entries that hold the values of a quantity, besides entry 0 for a missing pixel. Few, so that the page stays small.
 const LEVELS: u8 = 48;
-/// The same of a σ, which varies from pixel to pixel and is read coarsely: half the bytes.
+/// Palette entries that hold the values of a σ, which varies from pixel to pixel and is read coarsely: half the bytes.
 const SIGMA_LEVELS: u8 = 16;
 
-/// Pixels that tell the quantiles of a picture.
-const ENOUGH: usize = 10_000;
+/// Number of pixels from which the quantiles of a picture are taken: more take longer to sort, fewer miss small parts.
+const QUANTILE_PIXELS: usize = 10_000;
 
 /// The maps, each quantity followed by its σ.
-pub const QUANTITIES: [Quantity; 6] = [
-    Quantity { name: "Disparity", unit: "px", map: VIRIDIS, spread: Spread::Linear },
-    Quantity { name: "σ of disparity", unit: "px", map: CIVIDIS, spread: Spread::Logarithmic },
-    Quantity { name: "Depth velocity VZ", unit: "m/s", map: DIVERGING, spread: Spread::Symmetric },
-    Quantity { name: "σ of VZ", unit: "m/s", map: CIVIDIS, spread: Spread::Logarithmic },
-    Quantity { name: "Time to impact", unit: "s", map: EMBER, spread: Spread::Logarithmic },
-    Quantity { name: "σ of time to impact", unit: "s", map: CIVIDIS, spread: Spread::Logarithmic },
+pub(crate) const QUANTITIES: [Quantity; 6] = [
+    Quantity { name: "Disparity", unit: "px", map: VIRIDIS, scaling: ColourScaling::Linear },
+    Quantity { name: "σ of disparity", unit: "px", map: CIVIDIS, scaling: ColourScaling::Logarithmic },
+    Quantity { name: "Depth velocity VZ", unit: "m/s", map: DIVERGING, scaling: ColourScaling::Symmetric },
+    Quantity { name: "σ of VZ", unit: "m/s", map: CIVIDIS, scaling: ColourScaling::Logarithmic },
+    Quantity {
+        name: "Time to impact",
+        unit: "s",
+        map: INFERNO_REVERSED,
+        scaling: ColourScaling::Logarithmic,
+    },
+    Quantity { name: "σ of time to impact", unit: "s", map: CIVIDIS, scaling: ColourScaling::Logarithmic },
 ];
 
 /// How one quantity is shown.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quantity {
+pub(crate) struct Quantity {
     /// Its name.
     pub name: &'static str,
     /// Its unit.
     pub unit: &'static str,
     /// Its colours.
     pub map: ColourMap,
-    /// How they are spread.
-    pub spread: Spread,
+    /// How they are scaling.
+    pub scaling: ColourScaling,
 }
 
 /// The pictures of one frame.
@@ -54,15 +59,15 @@ pub struct FramePictures {
     /// The row of the run whose motion starts at this frame.
     pub row: usize,
     size: (usize, usize),
-    #[serde(with = "bytes")]
+    #[serde(with = "base64_text")]
     left_jpeg: Vec<u8>,
     maps: Vec<MapPicture>,
 }
 
-/// A map as PNG of palette indices, evenly spread over its own range of coordinates; 0 is missing.
+/// A map as PNG of palette indices, evenly scaling over its own range of coordinates; 0 is missing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct MapPicture {
-    #[serde(with = "bytes")]
+    #[serde(with = "base64_text")]
     png: Vec<u8>,
     levels: u8,
     /// Coordinates of the first and the last level.
@@ -100,33 +105,33 @@ impl FramePictures {
     }
 
     /// (width, height) of the pictures, in pixels.
-    pub fn size(&self) -> (usize, usize) {
+    pub(crate) fn size(&self) -> (usize, usize) {
         self.size
     }
 
     /// Bytes that are kept.
-    pub fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.left_jpeg.len() + self.maps.iter().map(|map| map.png.len()).sum::<usize>()
     }
 
     /// Whether there are maps, or the left image alone.
-    pub fn has_maps(&self) -> bool {
+    pub(crate) fn has_maps(&self) -> bool {
         !self.maps.is_empty()
     }
 
     /// The left image as JPEG; empty where there is none.
-    pub fn left_jpeg(&self) -> &[u8] {
+    pub(crate) fn left_jpeg(&self) -> &[u8] {
         &self.left_jpeg
     }
 
-    /// Quantity `i` as PNG in colours spread over `range` (coordinates); `None` if it is empty.
-    pub fn map_png(&self, i: usize, range: (f64, f64)) -> Option<Vec<u8>> {
+    /// Quantity `i` as PNG in colours scaling over `range` (coordinates); `None` if it is empty.
+    pub(crate) fn map_png(&self, i: usize, range: (f64, f64)) -> Option<Vec<u8>> {
         let map = self.maps.get(i)?;
         recolour(&map.png, &map.palette(QUANTITIES.get(i)?.map, range))
     }
 
     /// Range of the coordinates of quantity `i`: its 2nd to 98th percentile; `None` without a value.
-    pub fn range(&self, i: usize) -> Option<(f64, f64)> {
+    pub(crate) fn range(&self, i: usize) -> Option<(f64, f64)> {
         self.maps.get(i)?.range
     }
 }
@@ -138,10 +143,10 @@ fn sigma_s(impact: &TimeToImpact) -> Option<f64> {
 
 /// The picture of quantity `i`, whose values are `factor` times those of `plane`.
 fn map(plane: &Grid<f32>, factor: f64, i: usize, width_px: usize) -> MapPicture {
-    let spread = QUANTITIES[i].spread;
+    let scaling = QUANTITIES[i].scaling;
     let values = centres(plane, width_px);
     let (width, height) = values.size();
-    let coordinates = Grid::from_fn(width, height, |u, v| spread.coordinate(factor * values.at(u, v)));
+    let coordinates = Grid::from_fn(width, height, |u, v| scaling.coordinate(factor * values.at(u, v)));
     let mut present: Vec<f64> = sample(&coordinates).filter(|c| c.is_finite()).collect();
     present.sort_unstable_by(f64::total_cmp);
     let between = |low: f64, high: f64| of_sorted(&present, low).zip(of_sorted(&present, high));
@@ -169,7 +174,7 @@ fn of_sorted(values: &[f64], share: f64) -> Option<f64> {
 }
 
 impl MapPicture {
-    /// The colour of each index, the missing one first, when the colours are spread over `common`.
+    /// The colour of each index, the missing one first, when the colours are scaling over `common`.
     fn palette(&self, map: ColourMap, common: (f64, f64)) -> Vec<Rgb> {
         let (low, high) = self.ends;
         let share = |k: u8| {
@@ -192,7 +197,7 @@ fn grey(image: &Image, width_px: usize) -> Grid<u8> {
 
 /// Enough of a picture's values to tell their quantiles.
 fn sample(values: &Grid<f64>) -> impl Iterator<Item = f64> {
-    let every = values.values().len().div_ceil(ENOUGH).max(1);
+    let every = values.values().len().div_ceil(QUANTILE_PIXELS).max(1);
     values.values().iter().step_by(every).copied()
 }
 

@@ -4,25 +4,26 @@ use egomotion::metrics::{relative_pose_error, travelled_m};
 use maud::{Markup, html};
 use nalgebra::Vector3;
 
-use super::series::Series;
-use super::trajectory::Path;
-use super::{Eyes, FrameRow, Report, body, impact, trouble};
+use super::camera_path::CameraPath;
+use super::report::{FrameRow, InputKind, Report};
+use super::time_series::TimeSeries;
+use super::{body_velocity, impact, warnings};
 use crate::chart::number::{Unit, count, length, significant};
 
-/// One figure: what it is, its value, and what else to know.
-struct Figure {
+/// One number at the head of the page: its name, its value, and what else to know.
+struct HeadlineNumber {
     name: &'static str,
     value: String,
     beside: Vec<String>,
 }
 
 /// The first paragraph: how far, how fast, where to.
-pub fn lede(report: &Report<'_>) -> Markup {
+pub(crate) fn lede(report: &Report<'_>) -> Markup {
     let answered = report.frames.iter().any(|row| row.motion.is_some());
-    let (eyes, one, many) = match report.eyes {
-        Eyes::Stereo => ("a pair of cameras alone", "pair of images", "pairs of images"),
-        Eyes::Depth => ("a depth camera alone", "image with depth", "images with depth"),
-        Eyes::Tracks => ("points followed in a pair of cameras", "set of points", "sets of points"),
+    let (seen_from, one, many) = match report.input {
+        InputKind::Stereo => ("a pair of cameras alone", "pair of images", "pairs of images"),
+        InputKind::Depth => ("a depth camera alone", "image with depth", "images with depth"),
+        InputKind::Tracks => ("points followed in a pair of cameras", "set of points", "sets of points"),
     };
     let what = format!(
         "{}, {} × {} pixels",
@@ -43,21 +44,26 @@ pub fn lede(report: &Report<'_>) -> Markup {
             }
         }
         p class="about" {
-            "Seen from " (eyes) " (" (what) "): how they moved, how near each pixel is and how fast it comes nearer, and when it would be hit – each with the range that holds the true value 95 times out of 100."
+            "Seen from " (seen_from) " (" (what) "): how they moved, how near each pixel is and how fast it comes nearer, and when it would be hit – each with the range that holds the true value 95 times out of 100."
         }
     }
 }
 
-/// The figures below it.
-pub fn figures(report: &Report<'_>, path: &Path<'_>, body: &[Series]) -> Markup {
-    let figures = [far(report, path), fast(report, body), soonest(report), checked(report)];
+/// The numbers below it.
+pub(crate) fn headline_numbers(report: &Report<'_>, path: &CameraPath<'_>, body: &[TimeSeries]) -> Markup {
+    let numbers = [
+        distance_number(report, path),
+        speed_number(report, body),
+        impact_number(report),
+        truth_number(report),
+    ];
     html! {
         dl class="figures" {
-            @for figure in figures.into_iter().flatten() {
+            @for number in numbers.into_iter().flatten() {
                 div {
-                    dt { (figure.name) }
-                    dd { (figure.value) }
-                    @for line in figure.beside { dd class="beside" { (line) } }
+                    dt { (number.name) }
+                    dd { (number.value) }
+                    @for line in number.beside { dd class="beside" { (line) } }
                 }
             }
         }
@@ -83,9 +89,10 @@ fn in_words(speed_m_s: f64, unit: Unit) -> String {
 
 /// Distance over time of the answered intervals.
 fn mean_speed(report: &Report<'_>) -> Option<String> {
-    let answered = report.frames.iter().filter_map(|row| Some((body::speed_m_s(row)?, row.interval_s()?)));
+    let answered =
+        report.frames.iter().filter_map(|row| Some((body_velocity::speed_m_s(row)?, row.interval_s()?)));
     let (way, time) = answered.fold((0.0, 0.0), |(way, time), (v, dt)| (way + v * dt, time + dt));
-    (time > 0.0).then(|| in_words(way / time, body::speed_unit(report.frames)))
+    (time > 0.0).then(|| in_words(way / time, body_velocity::speed_unit(report.frames)))
 }
 
 /// Where the camera faces at the end, against its start.
@@ -106,7 +113,7 @@ fn turned(report: &Report<'_>) -> Option<String> {
     })
 }
 
-fn far(report: &Report<'_>, path: &Path<'_>) -> Option<Figure> {
+fn distance_number(report: &Report<'_>, path: &CameraPath<'_>) -> Option<HeadlineNumber> {
     let (first, last) = report.poses.first().zip(report.poses.last())?;
     let away = (last.translation - first.translation).norm();
     let unit = length(away);
@@ -118,12 +125,12 @@ fn far(report: &Report<'_>, path: &Path<'_>) -> Option<Figure> {
         }
         None => "how sure the end is cannot be said".into(),
     });
-    Some(Figure { name: "Distance", value: distance(report), beside })
+    Some(HeadlineNumber { name: "Distance", value: distance(report), beside })
 }
 
-fn fast(report: &Report<'_>, body: &[Series]) -> Option<Figure> {
-    let speeds = || report.frames.iter().filter_map(body::speed_m_s);
-    let (low, high) = crate::chart::plot::extent(speeds())?;
+fn speed_number(report: &Report<'_>, body: &[TimeSeries]) -> Option<HeadlineNumber> {
+    let speeds = || report.frames.iter().filter_map(body_velocity::speed_m_s);
+    let (low, high) = crate::chart::axes::extent(speeds())?;
     let unit = length(high);
     let known =
         |k: usize| body.get(k).map(|s| (s.usual_band(), s.unit.clone())).filter(|(b, _)| b.is_finite());
@@ -136,11 +143,11 @@ fn fast(report: &Report<'_>, body: &[Series]) -> Option<Figure> {
     }
     let [low, high] = [low, high].map(|v| significant(v * unit.factor, 3));
     let value = if low == high { low } else { format!("{low} … {high}") };
-    Some(Figure { name: "Speed", value: format!("{value} {}/s", unit.name), beside })
+    Some(HeadlineNumber { name: "Speed", value: format!("{value} {}/s", unit.name), beside })
 }
 
 /// The shortest time to impact, or that there is none.
-fn soonest(report: &Report<'_>) -> Option<Figure> {
+fn impact_number(report: &Report<'_>) -> Option<HeadlineNumber> {
     let name = "Nearest impact";
     let of = |row: &FrameRow| Some((row.impact()?, row.frame));
     let answered = report.frames.iter().filter(|row| row.motion.is_some()).count();
@@ -153,25 +160,25 @@ fn soonest(report: &Report<'_>) -> Option<Figure> {
                 false => format!("not before {} s (95 %)", significant(seconds.low, 3)),
             };
             let beside = vec![between, format!("at frame {frame}, if nothing changed")];
-            Some(Figure { name, value: format!("{} s", significant(seconds.value, 2)), beside })
+            Some(HeadlineNumber { name, value: format!("{} s", significant(seconds.value, 2)), beside })
         }
         None if answered > 0 => {
             let reasons = impact::reasons(report.frames);
             let beside = reasons.iter().map(|(why, _)| why.to_string()).collect();
-            Some(Figure { name, value: "none".into(), beside })
+            Some(HeadlineNumber { name, value: "none".into(), beside })
         }
         None => None,
     }
 }
 
 /// Against the truth: how far off, and whether the stated uncertainty is true.
-fn checked(report: &Report<'_>) -> Option<Figure> {
-    let (share, components) = trouble::coverage(report)?;
+fn truth_number(report: &Report<'_>) -> Option<HeadlineNumber> {
+    let (share, components) = warnings::coverage(report)?;
     let within = format!("{} %", significant(100.0 * share, 3));
     let band = format!("{within} of {components} true values lie in their 95 % band");
     let name = "Off the truth";
     let Some(error) = relative_pose_error(report.poses, report.truth?) else {
-        return Some(Figure { name, value: "–".into(), beside: vec![band] });
+        return Some(HeadlineNumber { name, value: "–".into(), beside: vec![band] });
     };
     let unit = length(error.t_rmse_m);
     let value = unit.show(error.t_rmse_m * unit.factor, 2);
@@ -179,5 +186,5 @@ fn checked(report: &Report<'_>) -> Option<Figure> {
         format!("and {}° from frame to frame (root mean square)", significant(error.r_rmse_deg, 2)),
         band,
     ];
-    Some(Figure { name, value, beside })
+    Some(HeadlineNumber { name, value, beside })
 }

@@ -2,14 +2,14 @@
 
 use maud::{Markup, html};
 
-use super::{FrameRow, Report};
+use super::report::{FrameRow, Report};
 use crate::chart::number::{DEGREES, fixed, length, significant, with_sigma};
 
-/// Most rows of the table; all are in `motion.csv`.
-const MOST_ROWS: usize = 1000;
+/// Most rows of the table, so that a browser lays it out at once; all are in `motion.csv`.
+const MAX_ROWS: usize = 1000;
 
 /// One bar for each stage, and what is left of the whole.
-pub fn stages(report: &Report<'_>) -> Markup {
+pub(crate) fn stages(report: &Report<'_>) -> Markup {
     let mut stages: Vec<(&str, f64)> =
         report.stages_ms.iter().copied().filter(|(_, ms)| ms.is_finite() && *ms >= 0.0).collect();
     let sum: f64 = stages.iter().map(|(_, ms)| ms).sum();
@@ -32,8 +32,8 @@ pub fn stages(report: &Report<'_>) -> Markup {
 }
 
 /// Every frame in numbers.
-pub fn frames(report: &Report<'_>) -> Markup {
-    let shown = &report.frames[..report.frames.len().min(MOST_ROWS)];
+pub(crate) fn frames(report: &Report<'_>) -> Markup {
+    let shown = &report.frames[..report.frames.len().min(MAX_ROWS)];
     let largest = shown.iter().flat_map(|row| (0..3).filter_map(|i| row.component(i)));
     let metres = length(largest.map(|(v, _)| v.abs()).fold(0.0, f64::max));
     html! {

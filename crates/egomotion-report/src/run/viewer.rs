@@ -5,17 +5,19 @@ use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
 
 use super::pictures::{FramePictures, QUANTITIES, Quantity};
-use super::{Eyes, Report, Stop, outlines, player};
-use crate::chart::colour::Spread;
+use super::report::{InputKind, Report};
+use super::slider::SliderPosition;
+use super::{outlines, player};
+use crate::chart::axes::AxisScale;
+use crate::chart::colour::ColourScaling;
 use crate::chart::number::significant;
-use crate::chart::plot::Scale;
 
 /// The pictures, or why there are none.
-pub fn viewer(report: &Report<'_>, stops: &[Stop]) -> Markup {
-    let pictures: Vec<(usize, &FramePictures)> = stops
+pub(crate) fn viewer(report: &Report<'_>, positions: &[SliderPosition]) -> Markup {
+    let pictures: Vec<(usize, &FramePictures)> = positions
         .iter()
         .enumerate()
-        .filter_map(|(k, stop)| Some((k, report.album.pictures().get(stop.picture?)?)))
+        .filter_map(|(k, position)| Some((k, report.album.pictures().get(position.picture?)?)))
         .collect();
     let maps = pictures.iter().any(|(_, picture)| picture.has_maps());
     html! {
@@ -23,8 +25,8 @@ pub fn viewer(report: &Report<'_>, stops: &[Stop]) -> Markup {
             h2 { "What the camera saw" @if maps { ", and what every pixel says" } }
             p {
                 @if pictures.is_empty() { "There are no pictures: no two good frames could be compared. " }
-                @if stops.len() > 1 { span class="onscreen" { "Move the slider, press the arrow keys or touch a chart: all marks and pictures follow. " } }
-                @if report.eyes == Eyes::Tracks { "The run was given points that another program followed, and no images." }
+                @if positions.len() > 1 { span class="onscreen" { "Move the slider, press the arrow keys or touch a chart: all marks and pictures follow. " } }
+                @if report.input == InputKind::Tracks { "The run was given points that another program followed, and no images." }
                 @else if report.sparse { "This run followed corners alone (" code { "--observe sparse" } "), which is fast but makes no maps of every pixel." }
             }
             @if maps {
@@ -38,10 +40,10 @@ pub fn viewer(report: &Report<'_>, stops: &[Stop]) -> Markup {
                 div class=(if maps { "panels" } else { "panels one" }) {
                     figure {
                         figcaption { b { "Left image" } " " span class="unit" { "framed: moves by itself; dashed: the nearest obstacle" } }
-                        (stack(&pictures, "left image", first.size(), outlines::overlay(report, stops), |p| {
+                        (stack(&pictures, "left image", first.size(), outlines::overlay(report, positions), |p| {
                             Some(("jpeg", p.left_jpeg().to_vec())).filter(|(_, jpeg)| !jpeg.is_empty())
                         }))
-                        div class="words" tabindex="0" role="region" aria-label="what is outlined" { (outlines::words(report, stops)) }
+                        div class="words" tabindex="0" role="region" aria-label="what is outlined" { (outlines::words(report, positions)) }
                     }
                     @if maps { @for i in (0..QUANTITIES.len()).step_by(2) { (pair(report, &pictures, i, first.size())) } }
                 }
@@ -51,7 +53,7 @@ pub fn viewer(report: &Report<'_>, stops: &[Stop]) -> Markup {
                     "Hatched: no answer there. The colours mean the same in all frames; what lies beyond the ends of a bar has the colour of its end."
                 }
             }
-            @if let Some(shown) = player::shown(report, stops) { p class="small" { (shown) } }
+            @if let Some(shown) = player::shown(report, positions) { p class="small" { (shown) } }
         }
     }
 }
@@ -86,13 +88,14 @@ fn panel(
     quantity: &Quantity,
     size: (usize, usize),
 ) -> Markup {
-    let range = quantity.spread.common(pictures.iter().filter_map(|(_, p)| p.range(i)));
+    let range = quantity.scaling.common(pictures.iter().filter_map(|(_, p)| p.range(i)));
     // Most of a still scene moves alike: room beyond it shows what is faster.
-    let range = if quantity.spread == Spread::Symmetric { (1.4 * range.0, 1.4 * range.1) } else { range };
-    let ends = (quantity.spread.value(range.0), quantity.spread.value(range.1));
-    let scale = match quantity.spread {
-        Spread::Logarithmic => Scale::log(ends, (0.0, 100.0)),
-        Spread::Linear | Spread::Symmetric => Scale::linear(ends, (0.0, 100.0)),
+    let range =
+        if quantity.scaling == ColourScaling::Symmetric { (1.4 * range.0, 1.4 * range.1) } else { range };
+    let ends = (quantity.scaling.value(range.0), quantity.scaling.value(range.1));
+    let scale = match quantity.scaling {
+        ColourScaling::Logarithmic => AxisScale::log(ends, (0.0, 100.0)),
+        ColourScaling::Linear | ColourScaling::Symmetric => AxisScale::linear(ends, (0.0, 100.0)),
     };
     let ticks: Vec<(f64, f64, String)> =
         scale.ticks(8).into_iter().filter_map(|(v, label)| Some((v, scale.at(v)?, label))).collect();

@@ -1,4 +1,4 @@
-//! `page.html`: what studies show, and each figure as a file of its own.
+//! The paper's studies: each figure as an SVG, and `page.html`, which shows figures and tables.
 
 pub mod figure;
 pub mod page;

@@ -5,12 +5,12 @@ use maud::{Markup, html};
 
 use crate::chart::number::significant;
 
-/// Most rows on a page; the file holds all.
-const MOST_ROWS: usize = 500;
+/// Most rows on a page, so that a browser lays it out at once; the file holds all.
+const MAX_ROWS: usize = 500;
 
 /// Three significant digits; words to the left, numbers to the right.
-pub fn html(table: &Table) -> Markup {
-    let shown = &table.rows[..table.rows.len().min(MOST_ROWS)];
+pub(crate) fn html(table: &Table) -> Markup {
+    let shown = &table.rows[..table.rows.len().min(MAX_ROWS)];
     let words = |k: usize| table.rows.iter().any(|row| matches!(row.get(k), Some(Cell::Text(_))));
     let class: Vec<Option<&str>> = (0..table.columns.len()).map(|k| words(k).then_some("words")).collect();
     html! {

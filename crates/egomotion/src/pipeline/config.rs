@@ -186,12 +186,12 @@ pub enum PipelineError {
     Config(#[from] ConfigError),
 }
 
-/// Keys of the configuration that were renamed, with what to write instead.
-const RENAMED_KEYS: [(&[&str], &str); 1] = [(&["window"], "[vehicle]")];
+/// Keys of earlier configurations, with what takes their place now.
+const RENAMED_KEYS: [(&[&str], &str); 1] = [(&["window"], "vehicle")];
 
-/// What to write in place of a key that the configuration no longer has, as `["window"]`; `None` if it never had it.
+/// What to write in place of a key that the configuration no longer has, as `["window"]`; `None` for every other key.
 pub fn renamed_key(path: &[&str]) -> Option<&'static str> {
-    RENAMED_KEYS.iter().find(|(old, _)| path.starts_with(old)).map(|(_, new)| *new)
+    RENAMED_KEYS.iter().find(|(old, _)| *old == path).map(|(_, new)| *new)
 }
 
 impl Config {

@@ -9,7 +9,7 @@ use egomotion::pipeline::MovingGroup;
 use nalgebra::{Matrix6, Vector6};
 
 use self::pictures::{album, dense};
-use super::{Album, Eyes, FramePictures, FrameRow, Report, Scene, render, render_index};
+use super::{Album, FramePictures, FrameRow, InputKind, Report, SceneSummary, render, render_index};
 
 /// What a report refers to.
 pub struct Run {
@@ -76,7 +76,7 @@ impl Run {
             command: "egomotion run somewhere".into(),
             settings_toml: "seed = 1".into(),
             rig: &self.rig,
-            eyes: Eyes::Stereo,
+            input: InputKind::Stereo,
             sparse: false,
             complete: true,
             frames: &self.rows,
@@ -140,8 +140,13 @@ fn every_text_of_the_input_is_escaped() {
     assert!(!page.contains("<script>alert") && !page.contains("<img src=http") && !page.contains("<b></th>"));
     // Title twice, then source, status twice, command, settings, note.
     assert_eq!(page.matches("&lt;script&gt;alert").count(), 8);
-    let scene =
-        Scene { name: evil.into(), frames: 2, outcome: evil.into(), verdict: evil.into(), has_page: true };
+    let scene = SceneSummary {
+        name: evil.into(),
+        frames: 2,
+        outcome: evil.into(),
+        verdict: evil.into(),
+        has_page: true,
+    };
     let index = render_index(evil, evil, false, &[scene]);
     assert!(!index.contains("<script>alert") && !index.contains("<img src=http"));
 }

@@ -3,27 +3,12 @@
 use egomotion::metrics::quantile;
 use egomotion_study::{Axis, Layout};
 
+use crate::chart::axes::{AxisScale, extent};
 use crate::chart::number::significant;
-use crate::chart::plot::{Scale, extent};
-
-/// Size of tick labels.
-pub const TICK_PX: f64 = 11.0;
-
-/// Width of a text, estimated from its letters as the usual fonts draw them.
-pub fn width(text: &str, size_px: f64) -> f64 {
-    let of = |c: char| match c {
-        'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ';' | '\'' | '|' | '·' => 0.26,
-        'f' | 't' | 'r' | ' ' | '(' | ')' | '[' | ']' | '-' | '/' | '⁻' | '¹' => 0.34,
-        'm' | 'w' | 'M' | 'W' | '%' | '—' => 0.87,
-        c if c.is_uppercase() => 0.70,
-        _ => 0.56,
-    };
-    size_px * text.chars().map(of).sum::<f64>()
-}
 
 /// An axis that knows its range, before it has a place on the page.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ranged<'a> {
+pub(crate) struct RangedAxis<'a> {
     pub name: &'a str,
     layout: &'a Layout,
     range: (f64, f64),
@@ -31,9 +16,9 @@ pub struct Ranged<'a> {
     wanted: Vec<f64>,
 }
 
-impl<'a> Ranged<'a> {
+impl<'a> RangedAxis<'a> {
     /// The x axis, over these values: all of them fit.
-    pub fn across(axis: &'a Axis, values: &[f64]) -> Self {
+    pub(crate) fn across(axis: &'a Axis, values: &[f64]) -> Self {
         let mut distinct = known(&axis.layout, values);
         distinct.sort_by(f64::total_cmp);
         distinct.dedup();
@@ -49,7 +34,7 @@ impl<'a> Ranged<'a> {
     }
 
     /// The y axis, over these values, of which single ones far from all others may lie outside.
-    pub fn upwards(axis: &'a Axis, values: &[f64]) -> Self {
+    pub(crate) fn upwards(axis: &'a Axis, values: &[f64]) -> Self {
         let values = known(&axis.layout, values);
         let range = match &axis.layout {
             Layout::Places(names) => (-0.5, names.len().max(1) as f64 - 0.5),
@@ -60,26 +45,26 @@ impl<'a> Ranged<'a> {
     }
 
     /// Whether this value can lie on the axis, inside or beyond its ends.
-    pub fn takes(&self, value: f64) -> bool {
+    pub(crate) fn takes(&self, value: f64) -> bool {
         !value.is_nan() && (*self.layout != Layout::Log || value > 0.0)
     }
 
     /// −1 below the range, 1 above it, 0 inside.
-    pub fn side(&self, value: f64) -> i8 {
+    pub(crate) fn side(&self, value: f64) -> i8 {
         let (lo, hi) = self.range;
         i8::from(value > hi) - i8::from(value < lo)
     }
 
     /// The scale onto these SVG units.
-    pub fn scale(&self, to: (f64, f64)) -> Scale {
+    pub(crate) fn scale(&self, to: (f64, f64)) -> AxisScale {
         match self.layout {
-            Layout::Log => Scale::log(self.range, to),
-            Layout::Linear | Layout::Places(_) => Scale::linear(self.range, to),
+            Layout::Log => AxisScale::log(self.range, to),
+            Layout::Linear | Layout::Places(_) => AxisScale::linear(self.range, to),
         }
     }
 
     /// Ticks with their labels, about `n` unless the places are named.
-    pub fn ticks(&self, n: usize) -> Vec<(f64, String)> {
+    pub(crate) fn ticks(&self, n: usize) -> Vec<(f64, String)> {
         match self.layout {
             Layout::Places(names) => {
                 names.iter().enumerate().map(|(k, name)| (k as f64, name.clone())).collect()
@@ -101,7 +86,7 @@ impl<'a> Ranged<'a> {
     }
 
     /// Places of unlabelled ticks between the decades of a logarithmic axis.
-    pub fn minor_ticks(&self) -> Vec<f64> {
+    pub(crate) fn minor_ticks(&self) -> Vec<f64> {
         let (lo, hi) = self.range;
         let decades = (hi / lo).log10();
         if *self.layout != Layout::Log || !self.wanted.is_empty() || !(0.5..=6.0).contains(&decades) {
@@ -113,7 +98,7 @@ impl<'a> Ranged<'a> {
     }
 
     /// Whether places have names.
-    pub fn is_named(&self) -> bool {
+    pub(crate) fn is_named(&self) -> bool {
         matches!(self.layout, Layout::Places(_))
     }
 }
@@ -134,7 +119,7 @@ fn padded((lo, hi): (f64, f64), log: bool, share: f64) -> (f64, f64) {
     }
 }
 
-/// Room for all values, but not for single ones that would press the others flat.
+/// LabelSpace for all values, but not for single ones that would press the others flat.
 fn linear_range(values: &[f64]) -> (f64, f64) {
     let Some((mut lo, mut hi)) = extent(values.iter().copied()) else { return (0.0, 1.0) };
     if let (8.., Some(low), Some(high)) = (values.len(), quantile(values, 0.1), quantile(values, 0.9))
@@ -150,7 +135,7 @@ fn linear_range(values: &[f64]) -> (f64, f64) {
     (if from_zero { 0.0 } else { below }, if to_zero { 0.0 } else { above })
 }
 
-/// Room for all values down to 18 decades below the largest.
+/// LabelSpace for all values down to 18 decades below the largest.
 fn log_range(values: &[f64]) -> (f64, f64) {
     let Some((lo, hi)) = extent(values.iter().copied()) else { return (1.0, 10.0) };
     padded((lo.max(1e-18 * hi), hi), true, 0.06)

@@ -5,27 +5,26 @@ use base64::engine::general_purpose::STANDARD;
 use egomotion::geometry::{Field, Grid, Image};
 use maud::{Markup, html};
 
-use super::axis::{TICK_PX, width};
-use super::{PANEL_WIDTH, Room, TITLE_PX};
+use super::layout::{LabelSpace, PANEL_WIDTH, TICK_PX, TITLE_PX, text_width};
+use crate::chart::axes::AxisScale;
 use crate::chart::colour::{ColourMap, DIVERGING, Rgb, VIRIDIS};
-use crate::chart::plot::Scale;
 use crate::chart::raster::{centres, encode, means};
 
-/// Most columns of an embedded picture.
-const MOST_COLUMNS: usize = 640;
+/// Most columns of an embedded picture, so that a figure stays small; a panel is 360 units wide.
+const MAX_COLUMNS: usize = 640;
 /// Width of the colour bar.
 const BAR_PX: f64 = 11.0;
 /// Left edge of pictures.
-pub const LEFT: f64 = 4.0;
+pub(crate) const LEFT: f64 = 4.0;
 
 /// The height that a panel needs for a raster of that size, `beside` units of width being taken.
 fn height_for((width, height): (usize, usize), beside: f64) -> f64 {
     let wide = PANEL_WIDTH - LEFT - beside;
-    Room::TOP + (wide * height as f64 / width.max(1) as f64).clamp(20.0, 1.4 * wide) + 8.0
+    LabelSpace::TOP + (wide * height as f64 / width.max(1) as f64).clamp(20.0, 1.4 * wide) + 8.0
 }
 
 /// A quantity at every pixel.
-pub struct Map<'a> {
+pub(crate) struct Map<'a> {
     field: &'a Field,
     name: &'a str,
     /// Ends of the bar, the first below the second.
@@ -33,7 +32,7 @@ pub struct Map<'a> {
 }
 
 impl<'a> Map<'a> {
-    pub fn new(field: &'a Field, name: &'a str, (low, high): (f32, f32)) -> Self {
+    pub(crate) fn new(field: &'a Field, name: &'a str, (low, high): (f32, f32)) -> Self {
         let finite = low.is_finite() && high.is_finite();
         let range = match finite {
             true if high > low => (f64::from(low), f64::from(high)),
@@ -44,17 +43,17 @@ impl<'a> Map<'a> {
     }
 
     /// The height of a panel that it fills.
-    pub fn height(&self) -> f64 {
+    pub(crate) fn height(&self) -> f64 {
         height_for(self.field.size(), self.beside())
     }
 
     fn ticks(&self) -> Vec<(f64, String)> {
-        Scale::linear(self.range, (0.0, 1.0)).ticks(5)
+        AxisScale::linear(self.range, (0.0, 1.0)).ticks(5)
     }
 
     /// Width of the bar with its labels and name.
     fn beside(&self) -> f64 {
-        let widest = self.ticks().iter().map(|(_, label)| width(label, TICK_PX)).fold(0.0, f64::max);
+        let widest = self.ticks().iter().map(|(_, label)| text_width(label, TICK_PX)).fold(0.0, f64::max);
         8.0 + BAR_PX + 6.0 + widest + 20.0
     }
 
@@ -65,10 +64,10 @@ impl<'a> Map<'a> {
     }
 
     /// The map with its bar in a panel of that height; `id` is unique on a page.
-    pub fn draw(&self, height: f64, id: &str) -> Markup {
+    pub(crate) fn draw(&self, height: f64, id: &str) -> Markup {
         let place = Place::inside(self.field.size(), self.beside(), height);
         let bar_x = place.x + place.width + 8.0;
-        let bar = Scale::linear(self.range, (place.y + place.height, place.y));
+        let bar = AxisScale::linear(self.range, (place.y + place.height, place.y));
         let right = bar_x + BAR_PX;
         let colours = self.colours();
         html! {
@@ -96,7 +95,7 @@ impl<'a> Map<'a> {
     }
 
     fn png(&self) -> Option<Vec<u8>> {
-        let small = centres(self.field.grid(), MOST_COLUMNS);
+        let small = centres(self.field.grid(), MAX_COLUMNS);
         let (low, high) = self.range;
         let index = |v: f64| {
             if v.is_nan() {
@@ -114,14 +113,14 @@ impl<'a> Map<'a> {
 }
 
 /// The height of a panel that a picture fills.
-pub fn picture_height(image: &Image) -> f64 {
-    height_for(image.size(), Room::RIGHT)
+pub(crate) fn picture_height(image: &Image) -> f64 {
+    height_for(image.size(), LabelSpace::RIGHT)
 }
 
 /// A picture in grey levels.
-pub fn picture(image: &Image, height: f64, name: &str) -> Markup {
-    let place = Place::inside(image.size(), Room::RIGHT, height);
-    let small = means(image, MOST_COLUMNS);
+pub(crate) fn picture(image: &Image, height: f64, name: &str) -> Markup {
+    let place = Place::inside(image.size(), LabelSpace::RIGHT, height);
+    let small = means(image, MAX_COLUMNS);
     let (wide, tall) = small.size();
     let levels = Grid::from_fn(wide, tall, |u, v| small.at(u, v).clamp(0.0, 255.0).round() as u8);
     html! { (place.image(encode(&levels, None), name)) (place.rect("none")) }
@@ -140,10 +139,10 @@ struct Place {
 impl Place {
     /// As large as it can be, its shape kept.
     fn inside((width, height): (usize, usize), beside: f64, panel_height: f64) -> Self {
-        let (room_x, room_y) = (PANEL_WIDTH - LEFT - beside, panel_height - Room::TOP - 8.0);
+        let (room_x, room_y) = (PANEL_WIDTH - LEFT - beside, panel_height - LabelSpace::TOP - 8.0);
         let (w, h) = (width.max(1) as f64, height.max(1) as f64);
         let scale = (room_x / w).min(room_y / h);
-        Self { x: LEFT, y: Room::TOP, width: w * scale, height: h * scale, coarse: w < room_x }
+        Self { x: LEFT, y: LabelSpace::TOP, width: w * scale, height: h * scale, coarse: w < room_x }
     }
 
     fn rect(&self, fill: &str) -> Markup {

@@ -1,6 +1,7 @@
 //! A figure of the library as SVG: panels on a grid, one legend for all of them.
 
 mod axis;
+mod layout;
 mod map;
 mod plot;
 mod style;
@@ -10,37 +11,17 @@ mod tests;
 use egomotion_study::{Content, Figure, Panel};
 use maud::{Markup, html};
 
-use axis::width;
+use layout::{LabelSpace, PANEL_WIDTH, TITLE_PX, text_width};
 use map::Map;
 use plot::Plot;
 use style::{Style, styles};
 
-/// Width of a panel, in SVG units.
-const PANEL_WIDTH: f64 = 360.0;
 /// Height of a panel of lines; one of maps has the height of its maps.
 const PLOT_HEIGHT: f64 = 272.0;
-/// Size of titles and of the names of axes.
-const TITLE_PX: f64 = 12.0;
-/// Between panels.
-const GAP: f64 = 18.0;
-/// Fonts that look alike; the last is anybody's.
+/// Space between panels, in SVG units.
+const PANEL_GAP: f64 = 18.0;
+/// Fonts that look alike, of which every system has one; the last is any without serifs.
 const FONTS: &str = "Helvetica, Arial, Liberation Sans, DejaVu Sans, sans-serif";
-
-/// Space beside a plot that its labels take; panels of a figure share it, so that their axes line up.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Room {
-    left: f64,
-    bottom: f64,
-}
-
-impl Room {
-    const TOP: f64 = 24.0;
-    const RIGHT: f64 = 10.0;
-
-    fn or(self, other: Self) -> Self {
-        Self { left: self.left.max(other.left), bottom: self.bottom.max(other.bottom) }
-    }
-}
 
 /// What a panel holds, ready to be drawn.
 enum Drawable<'a> {
@@ -58,11 +39,11 @@ impl<'a> Drawable<'a> {
         }
     }
 
-    fn room(&self) -> Room {
-        if let Self::Plot(plot) = self { plot.room() } else { Room::default() }
+    fn room(&self) -> LabelSpace {
+        if let Self::Plot(plot) = self { plot.room() } else { LabelSpace::default() }
     }
 
-    fn height(&self, room: Room) -> f64 {
+    fn height(&self, room: LabelSpace) -> f64 {
         match self {
             // Long names of places make a panel taller, not its plot flatter.
             Self::Plot(_) => PLOT_HEIGHT + (room.bottom - 37.0).max(0.0),
@@ -73,7 +54,7 @@ impl<'a> Drawable<'a> {
 }
 
 /// A figure in pieces that a page or a file puts together.
-pub struct Drawing {
+pub(crate) struct Drawing {
     /// Panels in a row.
     pub columns: usize,
     /// Height of each panel, alike in a row, and its inside.
@@ -84,10 +65,10 @@ pub struct Drawing {
 
 impl Drawing {
     /// Draw the panels of a figure; `id` is unique on a page and names what is inside.
-    pub fn new(figure: &Figure, id: &str) -> Self {
+    pub(crate) fn new(figure: &Figure, id: &str) -> Self {
         let styles = styles(figure);
         let drawables: Vec<Drawable<'_>> = figure.panels.iter().map(Drawable::new).collect();
-        let room = drawables.iter().map(Drawable::room).fold(Room::default(), Room::or);
+        let room = drawables.iter().map(Drawable::room).fold(LabelSpace::default(), LabelSpace::or);
         let columns = figure.columns.clamp(1, figure.panels.len().max(1));
         let heights = drawables.chunks(columns).flat_map(|row| {
             let tallest = row.iter().map(|drawable| drawable.height(room)).fold(60.0, f64::max);
@@ -111,7 +92,7 @@ impl Drawing {
     }
 
     /// Each panel as an SVG of its own.
-    pub fn apart(&self) -> Markup {
+    pub(crate) fn apart(&self) -> Markup {
         html! {
             @for (height, inside) in &self.panels {
                 svg viewBox=(format!("0 0 {PANEL_WIDTH} {height:.1}")) font-family=(FONTS) role="img" { (inside) }
@@ -123,8 +104,8 @@ impl Drawing {
     fn together(&self) -> (Markup, f64) {
         let (mut places, mut top) = (Vec::new(), 0.0);
         for row in self.panels.chunks(self.columns) {
-            places.extend((0..row.len()).map(|k| (GAP + k as f64 * (PANEL_WIDTH + GAP), top)));
-            top += row.first().map_or(0.0, |(height, _)| height + GAP);
+            places.extend((0..row.len()).map(|k| (PANEL_GAP + k as f64 * (PANEL_WIDTH + PANEL_GAP), top)));
+            top += row.first().map_or(0.0, |(height, _)| height + PANEL_GAP);
         }
         let markup = html! {
             @for ((_, inside), (x, y)) in self.panels.iter().zip(&places) {
@@ -157,10 +138,10 @@ fn legend(styles: &[Style], drawables: &[Drawable<'_>]) -> Vec<(Markup, String)>
 /// The figure as a file of its own.
 pub fn svg(figure: &Figure) -> String {
     let drawing = Drawing::new(figure, "panel");
-    let wide = GAP + drawing.columns as f64 * (PANEL_WIDTH + GAP);
-    let title = lines(&figure.title, wide - 2.0 * GAP, 15.0);
-    let legend_top = GAP + 20.0 * title.len() as f64 + 6.0;
-    let (legend, legend_rows) = legend_at(&drawing.legend, wide - 2.0 * GAP);
+    let wide = PANEL_GAP + drawing.columns as f64 * (PANEL_WIDTH + PANEL_GAP);
+    let title = lines(&figure.title, wide - 2.0 * PANEL_GAP, 15.0);
+    let legend_top = PANEL_GAP + 20.0 * title.len() as f64 + 6.0;
+    let (legend, legend_rows) = legend_at(&drawing.legend, wide - 2.0 * PANEL_GAP);
     let panels_top = legend_top + 19.0 * legend_rows as f64 + 8.0;
     let (panels, panels_height) = drawing.together();
     let tall = panels_top + panels_height;
@@ -172,10 +153,10 @@ pub fn svg(figure: &Figure) -> String {
             rect width="100%" height="100%" fill="#fff" {}
             g font-size="15" font-weight="bold" fill="#111" {
                 @for (k, line) in title.iter().enumerate() {
-                    text x=(GAP) y=(format!("{:.0}", GAP + 12.0 + 20.0 * k as f64)) { (line) }
+                    text x=(PANEL_GAP) y=(format!("{:.0}", PANEL_GAP + 12.0 + 20.0 * k as f64)) { (line) }
                 }
             }
-            g transform=(format!("translate({GAP} {legend_top:.1})")) font-size=(TITLE_PX) fill="#111" { (legend) }
+            g transform=(format!("translate({PANEL_GAP} {legend_top:.1})")) font-size=(TITLE_PX) fill="#111" { (legend) }
             g transform=(format!("translate(0 {panels_top:.1})")) { (panels) }
         }
     };
@@ -191,7 +172,7 @@ fn legend_at(entries: &[(Markup, String)], most: f64) -> (Markup, usize) {
     let places: Vec<(f64, f64)> = entries
         .iter()
         .map(|(_, name)| {
-            let wide = 36.0 + width(name, TITLE_PX) + 14.0;
+            let wide = 36.0 + text_width(name, TITLE_PX) + 14.0;
             if x > 0.0 && x + wide > most {
                 (x, row) = (0.0, row + 1);
             }
@@ -213,7 +194,7 @@ fn lines(text: &str, most: f64, size_px: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
-            Some(line) if width(line, size_px) + width(word, size_px) < most => {
+            Some(line) if text_width(line, size_px) + text_width(word, size_px) < most => {
                 line.push(' ');
                 line.push_str(word);
             }

@@ -3,42 +3,43 @@
 use egomotion_study::{Axis, Layout, Line, Point, Series};
 use maud::{Markup, html};
 
-use super::axis::{Ranged, TICK_PX, width};
+use super::axis::RangedAxis;
+use super::layout::{LabelSpace, PANEL_WIDTH, TICK_PX, TITLE_PX, text_width};
 use super::style::Style;
-use super::{PANEL_WIDTH, Room, TITLE_PX};
-use crate::chart::plot::{Axes, path};
 
-/// About so many ticks.
-const TICKS: (usize, usize) = (6, 5);
-/// Most marks along one line.
-const MOST_MARKS: usize = 24;
-/// Sine of the angle by which long labels are turned.
+use crate::chart::axes::{Axes, path};
+
+/// About so many ticks along x and along y: with more their labels touch.
+const TICK_COUNTS: (usize, usize) = (6, 5);
+/// Most marks along one line: with more they cover it.
+const MAX_MARKS: usize = 24;
+/// Sine of the 30° by which long labels are turned.
 const SLANT: f64 = 0.5;
 
 /// A plot whose axes know their ranges.
-pub struct Plot<'a> {
-    x: Ranged<'a>,
-    y: Ranged<'a>,
+pub(crate) struct Plot<'a> {
+    x: RangedAxis<'a>,
+    y: RangedAxis<'a>,
     series: &'a [Series],
 }
 
 impl<'a> Plot<'a> {
-    pub fn new(x: &'a Axis, y: &'a Axis, series: &'a [Series]) -> Self {
+    pub(crate) fn new(x: &'a Axis, y: &'a Axis, series: &'a [Series]) -> Self {
         let points = || series.iter().flat_map(|series| &series.points);
         let across: Vec<f64> = points().map(|point| point.x).collect();
-        let x = Ranged::across(x, &across);
+        let x = RangedAxis::across(x, &across);
         let seen = points().filter(|point| x.takes(point.x));
         let upwards: Vec<f64> = seen.flat_map(|point| ends(point, &y.layout)).collect();
-        Self { y: Ranged::upwards(y, &upwards), x, series }
+        Self { y: RangedAxis::upwards(y, &upwards), x, series }
     }
 
     /// The room that labels and names take beside the plot.
-    pub fn room(&self) -> Room {
-        let labels = self.y.ticks(TICKS.1);
-        let widest = labels.iter().map(|(_, label)| width(label, TICK_PX)).fold(0.0, f64::max);
+    pub(crate) fn room(&self) -> LabelSpace {
+        let labels = self.y.ticks(TICK_COUNTS.1);
+        let widest = labels.iter().map(|(_, label)| text_width(label, TICK_PX)).fold(0.0, f64::max);
         let name = if self.y.name.is_empty() { 0.0 } else { 17.0 };
         let left = (name + widest + 10.0).min(0.45 * PANEL_WIDTH);
-        Room { left, bottom: self.below(left) }
+        LabelSpace { left, bottom: self.below(left) }
     }
 
     /// The room that labels and name take below the plot.
@@ -48,17 +49,17 @@ impl<'a> Plot<'a> {
     }
 
     fn widest_place(&self) -> f64 {
-        self.x.ticks(TICKS.0).iter().map(|(_, label)| width(label, TICK_PX)).fold(0.0, f64::max)
+        self.x.ticks(TICK_COUNTS.0).iter().map(|(_, label)| text_width(label, TICK_PX)).fold(0.0, f64::max)
     }
 
     /// Names of places that do not fit side by side are turned.
     fn is_slanted(&self, left: f64) -> bool {
-        let slot = (PANEL_WIDTH - left - Room::RIGHT) / self.x.ticks(TICKS.0).len().max(1) as f64;
+        let slot = (PANEL_WIDTH - left - LabelSpace::RIGHT) / self.x.ticks(TICK_COUNTS.0).len().max(1) as f64;
         self.x.is_named() && self.widest_place() + 6.0 > slot
     }
 
     /// Whether anything of this plot is drawn as a bar, and whether anything lies beyond its edges.
-    pub fn extras(&self) -> (bool, bool) {
+    pub(crate) fn extras(&self) -> (bool, bool) {
         let points =
             || self.series.iter().flat_map(|series| series.points.iter().map(move |p| (series.line, p)));
         let bars = points().any(|(line, point)| line != Line::Reference && error(point).is_some());
@@ -71,10 +72,10 @@ impl<'a> Plot<'a> {
     }
 
     /// The plot in a panel of that height; `id` is unique on a page.
-    pub fn draw(&self, room: Room, height: f64, styles: &[Style], id: &str) -> Markup {
+    pub(crate) fn draw(&self, room: LabelSpace, height: f64, styles: &[Style], id: &str) -> Markup {
         let axes = Axes {
-            x: self.x.scale((room.left, PANEL_WIDTH - Room::RIGHT)),
-            y: self.y.scale((height - room.bottom, Room::TOP)),
+            x: self.x.scale((room.left, PANEL_WIDTH - LabelSpace::RIGHT)),
+            y: self.y.scale((height - room.bottom, LabelSpace::TOP)),
         };
         let [left, top, wide, tall] = axes.inside();
         let drawn: Vec<(Style, &Series)> = self
@@ -120,7 +121,7 @@ impl<'a> Plot<'a> {
 
     fn marks(&self, axes: &Axes, style: &Style, series: &Series) -> Markup {
         let every =
-            if style.line == Line::Marks { 1 } else { series.points.len().div_ceil(MOST_MARKS).max(1) };
+            if style.line == Line::Marks { 1 } else { series.points.len().div_ceil(MAX_MARKS).max(1) };
         let [_, top, _, tall] = axes.inside();
         html! {
             @for (k, point) in series.points.iter().enumerate() {
@@ -139,14 +140,14 @@ impl<'a> Plot<'a> {
     }
 
     /// Grid lines, ticks, their labels and the names of the axes.
-    fn grid(&self, axes: &Axes, room: Room) -> Markup {
+    fn grid(&self, axes: &Axes, room: LabelSpace) -> Markup {
         let [left, top, wide, tall] = axes.inside();
         let (right, bottom) = (left + wide, top + tall);
         let slanted = self.is_slanted(room.left);
-        let x_ticks = placed(self.x.ticks(TICKS.0), |v| axes.x.at(v));
-        let y_ticks = placed(self.y.ticks(TICKS.1), |v| axes.y.at(v));
+        let x_ticks = placed(self.x.ticks(TICK_COUNTS.0), |v| axes.x.at(v));
+        let y_ticks = placed(self.y.ticks(TICK_COUNTS.1), |v| axes.y.at(v));
         let x_labels =
-            if slanted { x_ticks.clone() } else { apart(&x_ticks, |label| width(label, TICK_PX) + 5.0) };
+            if slanted { x_ticks.clone() } else { apart(&x_ticks, |label| text_width(label, TICK_PX) + 5.0) };
         let minor_x = self
             .x
             .minor_ticks()

@@ -16,7 +16,7 @@ const SHAPES: [Shape; 7] =
 
 /// The shape of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shape {
+pub(crate) enum Shape {
     Circle,
     Square,
     Up,
@@ -28,7 +28,7 @@ pub enum Shape {
 
 /// How one series looks.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Style {
+pub(crate) struct Style {
     pub name: String,
     pub line: Line,
     pub colour: &'static str,
@@ -37,7 +37,7 @@ pub struct Style {
 }
 
 /// One style for each name of a figure, in the order of their first appearance.
-pub fn styles(figure: &Figure) -> Vec<Style> {
+pub(crate) fn styles(figure: &Figure) -> Vec<Style> {
     let mut styles: Vec<Style> = Vec::new();
     let plots = figure.panels.iter().filter_map(|panel| match &panel.content {
         Content::Plot { series, .. } => Some(series),
@@ -71,7 +71,7 @@ impl Style {
     }
 
     /// The style of this series, which bears the name of `self` but may be drawn otherwise.
-    pub fn of(&self, series: &Series) -> Self {
+    pub(crate) fn of(&self, series: &Series) -> Self {
         let dash = match series.line {
             Line::Dashed => "5 3",
             Line::Reference => self.dash,
@@ -81,7 +81,7 @@ impl Style {
     }
 
     /// A line along a path.
-    pub fn stroke(&self, d: &str) -> Markup {
+    pub(crate) fn stroke(&self, d: &str) -> Markup {
         let width = if self.line == Line::Reference { "1.3" } else { "1.6" };
         html! {
             @if self.line != Line::Marks && !d.is_empty() {
@@ -92,7 +92,7 @@ impl Style {
     }
 
     /// A mark at a place: full for full lines, open for broken ones.
-    pub fn mark(&self, x: f64, y: f64) -> Markup {
+    pub(crate) fn mark(&self, x: f64, y: f64) -> Markup {
         let fill = if self.line == Line::Dashed { "#fff" } else { self.colour };
         html! {
             @if let Some(shape) = self.shape {
@@ -103,13 +103,13 @@ impl Style {
     }
 
     /// A small full triangle at the edge, for a point beyond it.
-    pub fn beyond(&self, x: f64, y: f64, upwards: bool) -> Markup {
+    pub(crate) fn beyond(&self, x: f64, y: f64, upwards: bool) -> Markup {
         let d = if upwards { "m-4.5 7.5l4.5 -7.5l4.5 7.5z" } else { "m-4.5 -7.5l4.5 7.5l4.5 -7.5z" };
         html! { path d=(format!("M{x:.1} {y:.1}{d}")) fill=(self.colour) stroke="#fff" stroke-width="0.7" {} }
     }
 
     /// What stands before the name in a legend, in 30 × 12 units.
-    pub fn sample(&self) -> Markup {
+    pub(crate) fn sample(&self) -> Markup {
         html! { (self.stroke("M1 6H29")) (self.mark(15.0, 6.0)) }
     }
 }

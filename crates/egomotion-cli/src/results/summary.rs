@@ -1,0 +1,129 @@
+//! `summary.json`: what was run, how it went, and where the time was spent.
+
+use std::collections::BTreeMap;
+
+use egomotion::geometry::{StereoRectification, StereoRig};
+use egomotion::pipeline::Config;
+use egomotion_io::source::{DepthSensor, Sequence};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::motion::status;
+use super::verdict::{MapVerdict, MotionVerdict};
+use crate::session::Outcome;
+
+/// Median disagreement of rows in pixels above which the user is warned: it then shows in every depth.
+const WARNED_ROW_DISAGREEMENT_PX: f64 = 0.25;
+
+/// Number of rows by their `status`.
+pub type StatusCounts = BTreeMap<String, usize>;
+
+/// Whether any row gives a motion, or part of one.
+pub fn has_answers(counts: &StatusCounts) -> bool {
+    counts.contains_key("ok") || counts.contains_key("partial")
+}
+
+/// What `summary.json` holds.
+#[derive(Serialize)]
+pub struct Summary {
+    pub version: &'static str,
+    pub source: String,
+    pub frames: usize,
+    /// Whether every frame was done.
+    pub complete: bool,
+    pub rig: StereoRig,
+    /// What the rig was made of.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cameras: Option<Cameras>,
+    /// The options of the command that matter to the results and are not in `config`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub options: Option<Value>,
+    pub config: Config,
+    pub seed: u64,
+    /// Rows by status.
+    pub counts: StatusCounts,
+    /// Answered intervals without an obstacle, by reason.
+    pub no_obstacle: BTreeMap<&'static str, usize>,
+    /// Mean milliseconds per frame.
+    pub stages_ms: BTreeMap<&'static str, f64>,
+    /// From the first decode to the last motion row, over frames; writing and report excluded.
+    pub frame_ms: f64,
+    pub wall_s: f64,
+    /// Median over the frames of the vertical disparity of matches, in pixels: 0 if perfectly rectified.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row_disagreement_px: Option<f64>,
+    /// What makes the answers less certain than they say.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
+    /// Against the source's own truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<MotionVerdict>,
+    /// Maps against the source's own truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth_maps: Option<MapVerdict>,
+}
+
+/// Raw cameras, and a depth sensor.
+#[derive(Debug, Clone, Serialize)]
+pub struct Cameras {
+    pub raw: Option<StereoRectification>,
+    pub depth: Option<DepthSensor>,
+}
+
+impl Cameras {
+    /// `None` where there is neither.
+    pub fn of(sequence: &Sequence) -> Option<Self> {
+        let cameras = Self { raw: sequence.rectification.clone(), depth: sequence.depth_sensor };
+        (cameras.raw.is_some() || cameras.depth.is_some()).then_some(cameras)
+    }
+}
+
+impl Summary {
+    /// Number of rows that give a motion, or part of one.
+    pub fn answered(&self) -> usize {
+        ["ok", "partial"].iter().filter_map(|status| self.counts.get(*status)).sum()
+    }
+
+    pub fn new(source: String, rig: StereoRig, config: &Config, outcome: &Outcome) -> Self {
+        let (mut counts, mut no_obstacle) = (StatusCounts::new(), BTreeMap::new());
+        for frame in outcome.frames.iter().skip(1) {
+            *counts.entry(status(frame).to_owned()).or_insert(0) += 1;
+            if let (Ok(_), Err(why)) = (&frame.motion.motion, &frame.motion.obstacle) {
+                *no_obstacle.entry(why.code()).or_insert(0) += 1;
+            }
+        }
+        let disagreements: Vec<f64> =
+            outcome.frames.iter().filter_map(|frame| frame.motion.row_disagreement_px).collect();
+        let row_disagreement_px = egomotion::metrics::quantile(&disagreements, 0.5);
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            source,
+            frames: outcome.frames.len(),
+            complete: outcome.complete,
+            rig,
+            cameras: None,
+            options: None,
+            seed: config.seed,
+            config: config.clone(),
+            counts,
+            no_obstacle,
+            stages_ms: outcome.stages_ms.iter().copied().collect(),
+            frame_ms: outcome.frame_ms,
+            wall_s: outcome.wall_s,
+            row_disagreement_px,
+            warnings: row_disagreement_px.and_then(badly_rectified).into_iter().collect(),
+            truth: MotionVerdict::of(outcome),
+            truth_maps: None,
+        }
+    }
+}
+
+/// What to say of a pair whose rows disagree.
+fn badly_rectified(rows_px: f64) -> Option<String> {
+    (rows_px > WARNED_ROW_DISAGREEMENT_PX).then(|| {
+        format!(
+            "Matches of left and right lie on different rows, by {rows_px:.2} px: the pair is not well rectified, \
+             and depths are less certain than their noise tells. Check the calibration."
+        )
+    })
+}
