@@ -15,7 +15,33 @@ pub type StereoMemory = Memory<KeptFrame>;
 
 /// Turns a sequence of stereo frames into motion.
 ///
-/// Feed it one frame after the other; it keeps the last good frame and what was computed of it.
+/// Feed it one frame after the other; it keeps the last good frame and what was computed of it. A bad frame gives an
+/// answer that says why, and the next good one is matched with the last good one.
+///
+/// ```
+/// use egomotion::pipeline::{Config, Observe, StereoFrame, StereoMotion, Unanswered};
+/// use egomotion::sim::Sequence;
+///
+/// let camera = Sequence::named("drive", Some((320, 240)), Some(3), 1.0).ok_or("no such sequence")?;
+/// let config = Config { observe: Observe::Sparse, ..Config::default() };
+/// let mut motion = StereoMotion::new(camera.rig, config)?;
+/// let frame = |k: usize| {
+///     let images = camera.view(k).ok_or("no such frame")?.render(2);
+///     Ok::<_, &str>(StereoFrame { time_s: 0.1 * k as f64, left: images.left, right: images.right })
+/// };
+///
+/// assert_eq!(motion.push(frame(0)?).motion, Err(Unanswered::First));
+/// let lost = motion.skip(0.1, Unanswered::MissingRight); // the frame 1 never came
+/// assert_eq!((lost.frame, motion.reference()), (1, Some(0)));
+///
+/// let answer = motion.push(frame(2)?);
+/// assert_eq!((answer.frame, answer.reference), (2, Some(0)));
+/// let estimate = answer.motion?;
+/// // The scene comes 50 mm nearer in each of the two intervals.
+/// assert!((estimate.phi().t.z + 0.1).abs() < 0.002, "{:?}", estimate.phi());
+/// assert!(estimate.is_complete() && estimate.theta.sigma(2) < 0.002);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct StereoMotion {
     rig: StereoRig,
