@@ -9,7 +9,7 @@ use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihoodOptions;
 use crate::estimate::linear::lmeds::LmedsOptions;
 use crate::estimate::linear::m_estimator::StudentT;
 use crate::motion::impact::Vehicle;
-use crate::observe::disparity::AreaOptions;
+use crate::observe::disparity::DisparityExpert;
 use crate::observe::flow::FlowError;
 use crate::observe::{DisparityOptions, FlowOptions, TrackOptions};
 
@@ -134,7 +134,7 @@ pub fn meaning(path: &[&str]) -> Option<&'static str> {
         ["vehicle", name] => of::<Vehicle>(name),
         ["tracks", name] => of::<TrackOptions>(name),
         ["disparity", name] => of::<DisparityOptions>(name),
-        ["disparity", "area", name] => of::<AreaOptions>(name),
+        ["disparity", "expert", name] => of::<DisparityExpert>(name),
         ["flow", name] => of::<FlowOptions>(name),
         ["irls", name] | ["maximum_likelihood", "kernel", name] => of::<StudentT>(name),
         ["lmeds", name] => of::<LmedsOptions>(name),
@@ -216,7 +216,6 @@ impl Config {
             (self.tracks.back_tolerance_px > 0.0, "tracks.back_tolerance_px must be positive"),
             (self.tracks.largest_residual > 0.0, "tracks.largest_residual must be positive"),
             (self.disparity.levels >= 1, "disparity.levels must be at least 1"),
-            (self.disparity.refinement_steps >= 1, "disparity.refinement_steps must be at least 1"),
             (kernels.iter().all(|k| k.nu > 0.0 && k.nu.is_finite()), "nu must be positive and finite"),
             (kernels.iter().all(|k| k.iterations >= 1), "iterations must be at least 1"),
             (kernels.iter().all(|k| k.tolerance > 0.0), "tolerance must be positive"),

@@ -16,9 +16,12 @@ use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::{Grid, StereoRig, Twist};
 use crate::motion::obstacle::{NoObstacle, Obstacle, ObstacleCriteria, nearest};
 use crate::observe::flow::{FlowPair, FlowSpace, Side, rigid_flow};
-use crate::observe::row_disagreement::row_disagreement;
-use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};
-use crate::observe::{DensePair, DisparityMap, FlowField, FlowOptions, StereoPyramid, StereoTrack};
+use crate::observe::tracks::{
+    Hints, SearchStart, StereoCorner, Trace, follow, stereo_corners, tracks_from_traces,
+};
+use crate::observe::{
+    DensePair, DisparityMap, FlowField, FlowOptions, StereoPyramid, StereoTrack, row_disagreement,
+};
 
 /// A frame that later ones are matched with.
 #[derive(Debug)]
@@ -103,43 +106,47 @@ impl FramePair<'_> {
         let step = corners.len().div_ceil(SCOUTS).max(1);
         let scouts: Vec<StereoCorner> = corners.iter().step_by(step).copied().collect();
         let mut found = match prior {
-            Some(_) => self.follow(&scouts, prior, Expected::FromLevel(PRIOR_LEVEL)),
+            Some(_) => self.follow(&scouts, prior, SearchStart::Level(PRIOR_LEVEL)),
             None => Vec::new(),
         };
         // A wrong prior loses most corners; then searching without it finds more.
         if 2 * found.len() < scouts.len() {
-            let free = self.follow(&scouts, None, Expected::FromLevel(usize::MAX));
+            let free = self.follow(&scouts, None, SearchStart::Level(usize::MAX));
             if free.len() > found.len() {
                 found = free;
             }
         }
-        let rough = self.solver().rough(&measured(&found, self.rig), prior);
+        let rough = self.solver().rough(&tracks_from_traces(&found, self.rig), prior);
         let traces = match &rough {
-            Ok(rough) => self.follow(&corners, Some(rough), Expected::Near),
+            Ok(rough) => self.follow(&corners, Some(rough), SearchStart::FullResolution),
             Err(_) => Vec::new(),
         };
         Tracked {
-            tracks: measured(&traces, self.rig),
+            tracks: tracks_from_traces(&traces, self.rig),
             rough,
             corners: traces.iter().map(|trace| trace.after).collect(),
         }
     }
 
-    fn follow(&self, corners: &[StereoCorner], motion: Option<&Twist>, expected: Expected) -> Vec<Trace> {
+    fn follow(&self, corners: &[StereoCorner], motion: Option<&Twist>, start: SearchStart) -> Vec<Trace> {
         let images = (&self.before.images, &self.after.images);
-        follow(images.0, images.1, corners, self.rig, self.hints(motion), expected, &self.config.tracks)
+        follow(images.0, images.1, corners, self.rig, self.hints(motion), start, &self.config.tracks)
     }
 
     fn hints<'b>(&'b self, motion: Option<&'b Twist>) -> Hints<'b> {
         let shift = self.before.disparity.as_ref().map(|d| &d.shift);
         let maps = self.before.disparity.as_ref().zip(self.after.disparity.as_ref());
         let both_right = self.before.images.has_right() && self.after.images.has_right();
-        let given = maps.filter(|_| !both_right).map(|(before, after)| [before, after]);
-        Hints { shift, motion, mask: self.masks[0], mask_right: self.masks[1], given }
+        let external_disparity = maps.filter(|_| !both_right).map(|(before, after)| [before, after]);
+        Hints { shift, motion, mask: self.masks[0], mask_right: self.masks[1], external_disparity }
     }
 
     fn solver(&self) -> TrackSolver<'_> {
-        let source = if self.hints(None).given.is_some() { TrackSource::Image } else { TrackSource::Stereo };
+        let source = if self.hints(None).external_disparity.is_some() {
+            TrackSource::Image
+        } else {
+            TrackSource::Stereo
+        };
         TrackSolver { rig: self.rig, config: self.config, dt_s: self.dt_s(), source }
     }
 
@@ -178,14 +185,14 @@ impl FramePair<'_> {
         let Some(flow) = flow else {
             return nothing(Unanswered::Unsolvable(Unsolvable::FewRows { rows: 0, needed: 6 }));
         };
-        let shaped = self.hints(None).given.is_some();
+        let shaped = self.hints(None).external_disparity.is_some();
         let pair = DensePair {
             rig: self.rig,
             before,
             after,
             flow: &flow,
             flow_right: right.as_ref(),
-            given: shaped,
+            external_disparity: shaped,
         };
         let by_shape =
             shaped && (self.config.method, self.config.approach) == (Method::Ml, Approach::Discrete);

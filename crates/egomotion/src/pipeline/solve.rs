@@ -55,7 +55,7 @@ impl Observed<'_> {
     fn source(&self) -> TrackSource {
         match self {
             Observed::Sparse(_, source) => *source,
-            Observed::Dense(pair, _) if pair.given => TrackSource::Image,
+            Observed::Dense(pair, _) if pair.external_disparity => TrackSource::Image,
             Observed::Dense(..) => TrackSource::Stereo,
         }
     }
