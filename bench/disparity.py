@@ -2,7 +2,7 @@
 
 usage: python bench/disparity.py DATA [ROUNDS]   (needs numpy and opencv-contrib-python-headless)
 DATA holds kitti_scene_flow_2015, kitti_stereo_flow_2012, middlebury_2001_2003, middlebury_2014_motorcycle.
-Builds and runs the example `time_disparity`; least milliseconds of all rounds, on two threads.
+Builds and runs the program `time_disparity` of the benches; least milliseconds of all rounds, on two threads.
 
 bad: off by more than 3 px (KITTI) or 1 px (Middlebury), or missing, in % of the pixels with truth;
 answered: % with an answer; off: bad % of those; median: of |error| over those; z: robust standard
@@ -18,6 +18,8 @@ import time
 
 import cv2
 import numpy as np
+
+from timing import program
 
 THREADS = 2
 
@@ -84,12 +86,8 @@ def judged(found, sigma, truth, sigma_truth, threshold):
 def main():
     data, rounds = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 5
     cv2.setNumThreads(THREADS)
-    root = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
-    target = os.environ.get("CARGO_TARGET_DIR", os.path.join(root, "target"))
-    build = ["cargo", "build", "--release", "-q", "-p", "egomotion", "--example", "time_disparity"]
-    subprocess.run(build, cwd=root, check=True)
     ours = subprocess.Popen(
-        [os.path.join(target, "release", "examples", "time_disparity")],
+        [program("egomotion", "time_disparity")],
         env=dict(os.environ, RAYON_NUM_THREADS=str(THREADS)),
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1,
     )

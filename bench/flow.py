@@ -2,7 +2,7 @@
 
 usage: python bench/flow.py DATA [ROUNDS]   (needs numpy and opencv-contrib-python-headless)
 DATA holds kitti_scene_flow_2015, kitti_stereo_flow_2012 and middlebury_flow_rubberwhale. Builds and
-runs the example `time_flow`; least and median milliseconds of all rounds, on two threads. On KITTI ours
+runs the program `time_flow` of the benches; least and median milliseconds of all rounds, on two threads. On KITTI ours
 is the pipeline's: pyramids and disparity are there, the rigid flow is predicted within the time.
 
 all: mean error (px) and % off by more than 3 px over all pixels with truth; where ours has no answer the
@@ -18,6 +18,8 @@ import time
 
 import cv2
 import numpy as np
+
+from timing import program
 
 THREADS = 2
 # As the command has it: freed memory stays with the process.
@@ -90,10 +92,7 @@ def main():
     data = sys.argv[1]
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 5
     cv2.setNumThreads(THREADS)
-    root = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
-    target = os.environ.get("CARGO_TARGET_DIR", os.path.join(root, "target"))
-    subprocess.run(["cargo", "build", "--release", "-q", "-p", "egomotion", "--example", "time_flow"], cwd=root, check=True)
-    program = os.path.join(target, "release", "examples", "time_flow")
+    ours = program("egomotion", "time_flow")
     environment = dict(os.environ, RAYON_NUM_THREADS=str(THREADS), **MEMORY)
     presets = {"DIS fast": cv2.DISOPTICAL_FLOW_PRESET_FAST, "DIS medium": cv2.DISOPTICAL_FLOW_PRESET_MEDIUM}
     print(f"load {os.getloadavg()[0]:.1f}; {rounds} rounds, {THREADS} threads; ms: least (median); error px, > 3 px %")
@@ -111,7 +110,7 @@ def main():
                     flow = dis.calc(*grey, None)
                     theirs[preset].append((time.perf_counter() - start) * 1e3)
                     theirs[preset, "flow"] = flow
-                line = subprocess.run([program, "8", out.name, *images, *camera], env=environment, check=True, capture_output=True, text=True)
+                line = subprocess.run([ours, "8", out.name, *images, *camera], env=environment, check=True, capture_output=True, text=True)
                 mine += [float(x) for x in line.stdout.split()]
             planes = np.fromfile(out.name, np.float32).reshape(6, *truth.shape[:2])
         print(name)

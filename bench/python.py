@@ -2,7 +2,7 @@
 
 usage: python bench/python.py SEQUENCE [ROUNDS]   (needs the built wheel, numpy and pillow)
 SEQUENCE is a folder in KITTI odometry's layout, such as DATA/kitti_odometry/sequences/06.
-Builds and runs the example `time_pipeline`, alternating with this process; medians over all frames of all rounds.
+Builds and runs the program `time_pipeline` of the benches, alternating with this process; medians over all frames of all rounds.
 
 push      ms a frame with images in memory: of Rust's StereoMotion::push, and of StereoMotion.push with uint8 arrays
 formula   ms of a million points' VZ with its variance: Rust's library, and StereoTracks.depth_velocity
@@ -20,13 +20,12 @@ from PIL import Image
 
 import egomotion
 
+from timing import program
+
 FRAMES = 30
 WARM = 3
 THREADS = 2
 POINTS = 1_000_000
-ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
-TARGET = os.environ.get("CARGO_TARGET_DIR", os.path.join(ROOT, "target"))
-EXAMPLE = os.path.join(TARGET, "release", "examples", "time_pipeline")
 
 
 def images(sequence):
@@ -72,13 +71,12 @@ def throughput(rig, frames, workers):
 
 def main():
     sequence, rounds = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 5
-    build = ["cargo", "build", "--release", "--quiet", "-p", "egomotion-io", "--example", "time_pipeline"]
-    subprocess.run(build, cwd=ROOT, check=True)
+    ours = program("egomotion-io", "time_pipeline")
     frames, rig = images(sequence), egomotion.run(sequence).rig
     tracks = points(rig)
     times = {"push": ([], []), "formula": ([], [])}
     for _ in range(rounds):
-        told = subprocess.run([EXAMPLE, sequence, str(FRAMES), str(THREADS)], check=True, capture_output=True)
+        told = subprocess.run([ours, sequence, str(FRAMES), str(THREADS)], check=True, capture_output=True)
         rust = json.loads(told.stdout)
         for name, own in (("push", pushes(rig, frames, THREADS)), ("formula", formula(tracks, rig))):
             times[name][0].extend(rust[f"{name}_ms"][WARM:])

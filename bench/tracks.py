@@ -1,7 +1,7 @@
 """Four-way sparse tracks on KITTI: ours beside OpenCV's corners and Lucas-Kanade, alternating.
 
 usage: python bench/tracks.py SEQUENCE [ROUNDS]   (SEQUENCE holds image_0, image_1; needs opencv-contrib-python-headless)
-Builds and runs the example `time_tracks`; prints milliseconds a pair, least and median, on two threads.
+Builds and runs the program `time_tracks` of the benches; prints milliseconds a pair, least and median, on two threads.
 """
 import os
 import subprocess
@@ -10,6 +10,8 @@ import time
 
 import cv2
 import numpy as np
+
+from timing import program
 
 FRAMES = 11
 THREADS = 2
@@ -45,10 +47,7 @@ def main():
     folder = sys.argv[1]
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 5
     cv2.setNumThreads(THREADS)
-    root = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
-    target = os.environ.get("CARGO_TARGET_DIR", os.path.join(root, "target"))
-    subprocess.run(["cargo", "build", "--release", "-q", "-p", "egomotion", "--example", "time_tracks"], cwd=root, check=True)
-    ours = os.path.join(target, "release", "examples", "time_tracks")
+    ours = program("egomotion", "time_tracks")
     read = lambda side, k: cv2.imread(os.path.join(folder, f"image_{side}/{k:06d}.png"), cv2.IMREAD_GRAYSCALE)
     frames = [(read(0, k), read(1, k)) for k in range(FRAMES)]
     environment = dict(os.environ, RAYON_NUM_THREADS=str(THREADS))

@@ -30,8 +30,14 @@ fn estimation(c: &mut Criterion) {
     let maps = (disparity(0), disparity(2));
     let flow = dense_flow(&before.left, &after.left, None, &config.flow).unwrap();
     let tracks = stereo_tracks(&before, &after, &rig, Hints::default(), &config.tracks);
-    let pair =
-        DensePair { rig: &rig, before: &maps.0, after: &maps.1, flow: &flow, flow_right: None, given: false };
+    let pair = DensePair {
+        rig: &rig,
+        before: &maps.0,
+        after: &maps.1,
+        flow: &flow,
+        flow_right: None,
+        external_disparity: false,
+    };
     let interval = Interval::new(&rig, &config, TrackSource::Stereo, 0.1);
     let start = solve(&Observed::Tracks(&tracks), &interval, None).unwrap().phi();
 

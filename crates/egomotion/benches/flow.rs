@@ -7,7 +7,6 @@ mod street;
 use criterion::Criterion;
 use egomotion::geometry::Twist;
 use egomotion::observe::flow::{FlowPair, FlowSpace, Side, rigid_flow};
-use egomotion::observe::spline::coefficients;
 use egomotion::observe::{DisparityMatcher, DisparityOptions, FlowOptions, StereoPyramid};
 use nalgebra::Vector3;
 
@@ -29,9 +28,6 @@ fn flow(c: &mut Criterion) {
     let mut space = FlowSpace::default();
     let pair = FlowPair { from: &before.left, to: &after.left, to_spline: Some(&after.left_spline) };
     let options = FlowOptions::default();
-    c.bench_function("spline of the level where the search ends", |b| {
-        b.iter(|| coefficients(&after.left.levels()[options.finest_search_level]));
-    });
     c.bench_function("flow, predicted", |b| b.iter(|| pair.flow(Some(&prediction), &options, &mut space)));
     c.bench_function("flow, free", |b| b.iter(|| pair.flow(None, &options, &mut space)));
     let one_way = FlowOptions { consistency_px: f32::INFINITY, ..options };

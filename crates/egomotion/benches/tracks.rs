@@ -6,9 +6,10 @@ mod street;
 
 use criterion::Criterion;
 use egomotion::estimate::{MaximumLikelihoodOptions, maximum_likelihood, robust_start};
-use egomotion::observe::StereoPyramid;
-use egomotion::observe::row_disagreement::row_disagreement;
-use egomotion::observe::tracks::{Expected, Hints, TrackOptions, follow, measured, stereo_corners};
+use egomotion::observe::tracks::{
+    Hints, SearchStart, TrackOptions, follow, stereo_corners, tracks_from_traces,
+};
+use egomotion::observe::{StereoPyramid, row_disagreement};
 
 fn tracking(c: &mut Criterion) {
     let Some((images, rig)) = street::two_frames(0) else { return };
@@ -25,11 +26,11 @@ fn tracking(c: &mut Criterion) {
             b.iter(|| stereo_corners(&before, &[], &rig, none, &options))
         });
         let new = stereo_corners(&before, &[], &rig, none, &options);
-        let far = Expected::FromLevel(usize::MAX);
+        let far = SearchStart::Level(usize::MAX);
         group.bench_function("follow, nothing known", |b| {
             b.iter(|| follow(&before, &after, &new, &rig, none, far, &options));
         });
-        let tracks = measured(&follow(&before, &after, &new, &rig, none, far, &options), &rig);
+        let tracks = tracks_from_traces(&follow(&before, &after, &new, &rig, none, far, &options), &rig);
         group.bench_function("robust start", |b| b.iter(|| robust_start(&tracks, &rig, None, &likelihood)));
         let start = robust_start(&tracks, &rig, None, &likelihood).unwrap();
         group.bench_function("maximum likelihood", |b| {
@@ -39,9 +40,9 @@ fn tracking(c: &mut Criterion) {
             maximum_likelihood(&tracks, &rig, &start, None, &likelihood.kernel).unwrap().motion.phi();
         let known = Hints { motion: Some(&motion), ..none };
         group.bench_function("follow, motion known", |b| {
-            b.iter(|| follow(&before, &after, &new, &rig, known, Expected::Near, &options));
+            b.iter(|| follow(&before, &after, &new, &rig, known, SearchStart::FullResolution, &options));
         });
-        let kept: Vec<_> = follow(&before, &after, &new, &rig, known, Expected::Near, &options)
+        let kept: Vec<_> = follow(&before, &after, &new, &rig, known, SearchStart::FullResolution, &options)
             .iter()
             .map(|trace| trace.after)
             .collect();

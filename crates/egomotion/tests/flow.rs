@@ -1,8 +1,8 @@
 //! Dense flow on synthetic images whose motion is known exactly.
 
 use egomotion::geometry::{Field, Grid, Image};
+use egomotion::observe::Pyramid;
 use egomotion::observe::flow::{FlowError, FlowField, FlowOptions, GUESS_SIGMA_PX, dense_flow};
-use egomotion::observe::pyramid::Pyramid;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64Mcg;
@@ -235,7 +235,7 @@ fn what_cannot_be_compared_is_refused() {
     assert_eq!(dense_flow(&pyramid(30), &pyramid(31), None, &options), mismatch);
     let prediction = FlowField::missing(31, 20);
     assert_eq!(dense_flow(&pyramid(30), &pyramid(30), Some(&prediction), &options), mismatch);
-    let options = FlowOptions { patch_stride_px: 0, ..options };
+    let options = FlowOptions { window_radius_px: 0, ..options };
     assert!(matches!(dense_flow(&pyramid(30), &pyramid(30), None, &options), Err(FlowError::Option(_))));
 }
 

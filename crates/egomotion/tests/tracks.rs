@@ -4,7 +4,7 @@ use egomotion::geometry::{RigidMotion, StereoRig};
 use egomotion::metrics::quantile;
 use egomotion::observe::StereoPyramid;
 use egomotion::observe::tracks::{
-    Expected, Hints, StereoCorner, TrackOptions, follow, measured, stereo_corners,
+    Hints, SearchStart, StereoCorner, TrackOptions, follow, stereo_corners, tracks_from_traces,
 };
 use egomotion::sim::{SensorNoise, Sequence};
 use nalgebra::{Matrix3, Vector3};
@@ -36,9 +36,9 @@ fn errors(name: &str, frames: usize, noise: &SensorNoise) -> Errors {
         let (after, view, phi) = (pyramid(k + 1), sequence.view(k).unwrap(), sequence.phi(k).unwrap());
         let hints = Hints { motion: Some(&phi), ..Hints::default() };
         let corners = stereo_corners(&before, &kept, rig, Hints::default(), &options);
-        let traces = follow(&before, &after, &corners, rig, hints, Expected::Near, &options);
+        let traces = follow(&before, &after, &corners, rig, hints, SearchStart::FullResolution, &options);
         let motion = phi.exp();
-        for track in measured(&traces, rig) {
+        for track in tracks_from_traces(&traces, rig) {
             let (u, v) = rig.pixel_from_image(track.before.mean.x, track.before.mean.y);
             let Some(truth) = view.truth_at(u, v) else { continue };
             let Some(later) = view.motion_at(&truth, &phi).later_xyd else { continue };

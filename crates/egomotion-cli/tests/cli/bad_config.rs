@@ -136,7 +136,7 @@ fn settings_out_of_range_end_in_a_message() {
         "sample_step_px = 0",
         "tracks.corners = 0",
         "irls.nu = -1.0",
-        "flow.patch_stride_px = 0",
+        "flow.window_radius_px = 0",
         "disparity.levels = 0",
         "lmeds.confidence = 1.0",
         "maximum_likelihood.confidence = 1.0",

@@ -23,7 +23,7 @@ fn the_settings_are_the_defaults_each_with_its_meaning() {
     }
     assert!(settings > 50, "{settings}");
     // No digits that a number of single precision does not have, and the choices of a word.
-    assert!(ended.stdout.contains("sigma_floor_px = 0.035\n"), "{}", ended.stdout);
+    assert!(ended.stdout.contains("max_sigma_px = 0.7\n"), "{}", ended.stdout);
     assert!(ended.stdout.contains("#   dcce: The paper's depth change constraint"), "{}", ended.stdout);
 }
 

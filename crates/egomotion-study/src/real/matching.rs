@@ -62,9 +62,7 @@ impl MatchedFrames {
         let mut shift = |pair: &StereoImages| matcher.compute(&pair.left, &pair.right);
         let disparity = [shift(a)?, shift(b)?, shift(c)?];
         let pyramids = |side: fn(&StereoImages) -> &egomotion::geometry::Image| {
-            frames
-                .each_ref()
-                .map(|pair| Pyramid::new(egomotion::observe::pyramid::smooth(side(pair)), PYRAMID_LEVELS))
+            frames.each_ref().map(|pair| Pyramid::new(egomotion::observe::smooth(side(pair)), PYRAMID_LEVELS))
         };
         let flow = |from: &Pyramid, to: &Pyramid| dense_flow(from, to, None, &FlowOptions::default());
         let [before, now, after] = pyramids(|pair| &pair.left);
@@ -79,7 +77,14 @@ impl MatchedFrames {
     /// The rounded maps of t and t+1 with the displacement between them: the discrete approach.
     pub(super) fn pair(&self) -> DensePair<'_> {
         let [_, before, after] = &self.rounded;
-        DensePair { rig: &self.rig, before, after, flow: &self.flow, flow_right: None, given: false }
+        DensePair {
+            rig: &self.rig,
+            before,
+            after,
+            flow: &self.flow,
+            flow_right: None,
+            external_disparity: false,
+        }
     }
 
     /// Disparity, its central differences in space and in time, and the image velocity, at a pixel at t: (7).

@@ -7,42 +7,44 @@ use crate::simd::vectorised;
 
 /// Half the side of the window over which the structure tensor is summed, in pixels.
 const RADIUS: usize = 3;
-/// Side of that window.
+/// Side of that window, in pixels.
 const SIDE: usize = 2 * RADIUS + 1;
+/// Columns handled at once, so that they vectorise.
+const LANES: usize = 16;
 
 /// A pixel whose neighbourhood can be located in both directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Corner {
+pub(super) struct Corner {
     /// Column, in pixels.
-    pub u: usize,
+    pub(super) u: usize,
     /// Row, in pixels.
-    pub v: usize,
+    pub(super) v: usize,
     /// Smaller eigenvalue of the mean structure tensor, in (grey levels per pixel)².
-    pub strength: f32,
+    pub(super) strength: f32,
 }
 
 /// Square cells over an image, a border kept free.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cells {
+pub(super) struct CornerCells {
     size: (usize, usize),
     cell: usize,
     border: usize,
 }
 
-impl Cells {
+impl CornerCells {
     /// Cells of side `cell_px` over an image of `size`, with `border_px` kept free around it.
-    pub fn new(size: (usize, usize), cell_px: usize, border_px: usize) -> Self {
+    pub(super) fn new(size: (usize, usize), cell_px: usize, border_px: usize) -> Self {
         Self { size, cell: cell_px.max(1), border: border_px.max(RADIUS + 1) }
     }
 
     /// Number of cells along the columns and down the rows.
-    pub fn count(&self) -> (usize, usize) {
+    pub(super) fn count(&self) -> (usize, usize) {
         let along = |n: usize| n.saturating_sub(2 * self.border).div_ceil(self.cell);
         (along(self.size.0), along(self.size.1))
     }
 
     /// Column and row of the cell that a place lies in, in pixels; `None` on the border and outside.
-    pub fn of(&self, u: f64, v: f64) -> Option<(usize, usize)> {
+    pub(super) fn of(&self, u: f64, v: f64) -> Option<(usize, usize)> {
         let along = |c: f64, n: usize| {
             let inside = c >= self.border as f64 && c < n as f64 - self.border as f64;
             inside.then(|| (c as usize - self.border) / self.cell)
@@ -63,7 +65,12 @@ impl Cells {
 /// The strongest corner of each cell that is not `taken` (one value per cell), strongest first.
 ///
 /// Corners below `least_strength` (in (grey levels per pixel)²) are left out.
-pub fn corners(image: &Image, cells: &Cells, taken: &Grid<bool>, least_strength: f32) -> Vec<Corner> {
+pub(super) fn corners(
+    image: &Image,
+    cells: &CornerCells,
+    taken: &Grid<bool>,
+    least_strength: f32,
+) -> Vec<Corner> {
     let (across, down) = cells.count();
     if across == 0 || down == 0 || taken.size() != (across, down) || image.size() != cells.size {
         return Vec::new();
@@ -81,7 +88,7 @@ pub fn corners(image: &Image, cells: &Cells, taken: &Grid<bool>, least_strength:
 }
 
 /// The strongest of each free cell in one row of cells.
-fn best_of_cells(best: &Best, cells: &Cells, taken: &[bool], least: f32) -> Vec<Corner> {
+fn best_of_cells(best: &ColumnMaxima, cells: &CornerCells, taken: &[bool], least: f32) -> Vec<Corner> {
     let columns = cells.columns();
     let strongest = |(k, (strengths, rows)): (usize, (&[f32], &[f32]))| {
         let mut corner = Corner { u: 0, v: 0, strength: least };
@@ -101,7 +108,7 @@ fn best_of_cells(best: &Best, cells: &Cells, taken: &[bool], least: f32) -> Vec<
 }
 
 /// The largest strength down each column of a few rows, and the row where it is.
-struct Best {
+struct ColumnMaxima {
     strength: Vec<f32>,
     row: Vec<f32>,
 }
@@ -111,9 +118,9 @@ fn best_of_columns(
     rows: std::ops::Range<usize>,
     columns: std::ops::Range<usize>,
     least: f32,
-) -> Best {
+) -> ColumnMaxima {
     let span = columns.len() + 2 * RADIUS;
-    let mut best = Best { strength: vec![least; columns.len()], row: vec![0.0; columns.len()] };
+    let mut best = ColumnMaxima { strength: vec![least; columns.len()], row: vec![0.0; columns.len()] };
     // Products of derivatives of the last rows, row r in slot r mod SIDE.
     let mut products = vec![0.0_f32; SIDE * 3 * span];
     let mut sums = vec![0.0_f32; 3 * span];
@@ -182,9 +189,6 @@ strongest_so_far(sums: &[f32], row: f32, best: &mut [f32], rows: &mut [f32]) {
 }
 }
 
-/// Columns handled at once.
-const LANES: usize = 16;
-
 #[inline(always)]
 fn keep_stronger<const N: usize>(
     sums: [&[f32]; 3],
@@ -217,7 +221,7 @@ mod tests {
     use super::*;
 
     fn all(image: &Image, cell: usize, border: usize, least: f32) -> Vec<Corner> {
-        let cells = Cells::new(image.size(), cell, border);
+        let cells = CornerCells::new(image.size(), cell, border);
         let (across, down) = cells.count();
         corners(image, &cells, &Grid::filled(across, down, false), least)
     }
@@ -240,7 +244,7 @@ mod tests {
     #[test]
     fn cells_that_are_taken_give_none() {
         let image = square();
-        let cells = Cells::new(image.size(), 20, 5);
+        let cells = CornerCells::new(image.size(), 20, 5);
         let (across, down) = cells.count();
         let mut taken = Grid::filled(across, down, false);
         let (a, b) = cells.of(20.0, 20.0).unwrap();

@@ -6,18 +6,23 @@
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 
-use super::window::{self, LANES, SIDE, Window};
+use super::window::{self, LANES, ONES, PIXELS, SIDE, Window, dot, smoothed_products, standardise, total};
 use crate::geometry::Image;
 use crate::simd::vectorised;
 
-pub use super::window::RADIUS;
+pub(super) use super::window::RADIUS;
 
-/// Number of pixels of a window.
-const AREA: f32 = (SIDE * SIDE) as f32;
+/// Ratios of the contrasts of two windows that may show one surface: cameras differ, but not by more.
+const SAME_SURFACE_GAIN: std::ops::Range<f32> = 0.33..3.0;
+/// Variance that smoothing by (1 2 1)/4 in both directions leaves of white noise of variance 1: (6/16)².
+const SMOOTHED_VARIANCE: f64 = 36.0 / 256.0;
+/// How much noise of that variance fitting the mean and the contrast takes from a window: both are
+/// patterns so coarse that smoothing leaves nearly all of their share, 0.9 and 0.8.
+const ABSORBED_BY_CONTRAST: f64 = 1.7;
 
 /// Along which directions a patch may move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Freedom {
+pub(crate) enum Freedom {
     /// Anywhere in the image.
     Plane,
     /// Along its row only: the epipolar line of a rectified pair.
@@ -26,7 +31,7 @@ pub enum Freedom {
 
 /// When a localisation ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settling {
+pub(crate) struct Settling {
     /// Most iterations.
     pub iterations: usize,
     /// A step shorter than this is the last, in pixels.
@@ -35,7 +40,7 @@ pub struct Settling {
 
 /// A window of an image, ready to be located elsewhere.
 #[derive(Debug, Clone)]
-pub struct Patch {
+pub(crate) struct Patch {
     values: Window,
     /// Derivatives, less what a change of brightness or contrast explains.
     du: Window,
@@ -51,7 +56,7 @@ pub struct Patch {
 /// Smoothing makes neighbours move together: noise that has become weak still moves a place as
 /// far. With g the derivatives and K the smoothing, Σ (K g)(K g)ᵀ takes the place of Σ g gᵀ.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Localisation {
+pub(crate) struct Localisation {
     /// Covariance of (u, v), free in the plane.
     pub plane: Matrix2<f64>,
     /// Covariance of that (u, v) with the u found along the row alone.
@@ -64,7 +69,7 @@ pub struct Localisation {
 
 /// Where a patch was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Located {
+pub(crate) struct Located {
     /// Column of the centre, in pixels.
     pub u: f64,
     /// Row of the centre, in pixels.
@@ -75,13 +80,13 @@ pub struct Located {
 
 impl Patch {
     /// The window of an image (as spline coefficients) around (u, v), in pixels; `None` near the border or without any contrast.
-    pub fn new(image: &Image, u: f64, v: f64) -> Option<Self> {
+    pub(crate) fn new(image: &Image, u: f64, v: f64) -> Option<Self> {
         plain_patch(image, u, v)
     }
 
     /// The same of the image magnified by `scale` around (u, v): what another image that shows the
     /// surface so much larger is compared with.
-    pub fn magnified(image: &Image, u: f64, v: f64, scale: f64) -> Option<Self> {
+    pub(crate) fn magnified(image: &Image, u: f64, v: f64, scale: f64) -> Option<Self> {
         spaced_patch(image, u, v, scale.recip())
     }
 
@@ -106,9 +111,9 @@ impl Patch {
         patch.contrast = standardise(&mut patch.values)?;
         patch.values.iter_mut().for_each(|row| row[SIDE..].fill(0.0));
         // Left in, they would let the place answer to a change of brightness, and shorten every step.
-        let square = AREA * patch.contrast * patch.contrast;
+        let square = PIXELS * patch.contrast * patch.contrast;
         for slope in [&mut patch.du, &mut patch.dv] {
-            let mean = dot(slope, &ONES) as f32 / AREA;
+            let mean = dot(slope, &ONES) as f32 / PIXELS;
             let along = dot(slope, &patch.values) as f32 / square;
             for row in 0..SIDE {
                 for i in 0..LANES {
@@ -122,37 +127,37 @@ impl Patch {
     }
 
     /// How noise moves the window's place; `None` for an edge.
-    pub fn localisation(&self) -> Option<Localisation> {
+    pub(crate) fn localisation(&self) -> Option<Localisation> {
         let inverse = self.tensor.try_inverse()?;
         let [uu, uv, vv] = smoothed_products(&self.du, &self.dv);
         let noise = Matrix2::new(uu, uv, uv, vv);
         let to_place = inverse * noise;
         let by_row = self.tensor.m11.recip();
-        let absorbed = (BRIGHTNESS_AND_CONTRAST + to_place.trace()) / f64::from(AREA);
+        let absorbed = (ABSORBED_BY_CONTRAST + to_place.trace()) / f64::from(PIXELS);
         Some(Localisation {
             plane: to_place * inverse,
             plane_row: to_place.column(0) * by_row,
             row: uu * by_row * by_row,
-            left_over: SMOOTHED - absorbed,
+            left_over: SMOOTHED_VARIANCE - absorbed,
         })
     }
 
     /// Standard deviation of the grey levels in the window.
-    pub fn contrast(&self) -> f64 {
+    pub(crate) fn contrast(&self) -> f64 {
         f64::from(self.contrast)
     }
 
     /// Smaller eigenvalue of the mean of ∇I ∇Iᵀ, in (grey levels per pixel)².
-    pub fn strength(&self) -> f64 {
+    pub(crate) fn strength(&self) -> f64 {
         let t = &self.tensor;
         let half = 0.5 * (t[(0, 0)] - t[(1, 1)]);
-        (0.5 * t.trace() - half.hypot(t[(0, 1)])) / f64::from(AREA)
+        (0.5 * t.trace() - half.hypot(t[(0, 1)])) / f64::from(PIXELS)
     }
 
     /// Find the window in `image` (as spline coefficients) from a start (u, v), in pixels.
     ///
     /// `None` if it leaves the image, has no contrast there, is not locatable, or has not settled.
-    pub fn locate(
+    pub(crate) fn locate(
         &self,
         image: &Image,
         start: (f64, f64),
@@ -212,9 +217,8 @@ descend(
     for _ in 0..settling.iterations {
         let mut there: Window = window::sample(image, u, v)?;
         let contrast = standardise(&mut there)?;
-        // Contrasts may differ between cameras, but not by this much if it is the same surface.
         let gain = patch.contrast / contrast;
-        if !(0.33..3.0).contains(&gain) {
+        if !SAME_SURFACE_GAIN.contains(&gain) {
             return None;
         }
         let (pull, square) = patch.pull(&there, gain);
@@ -224,110 +228,11 @@ descend(
         );
         (u, v) = (u + step.0, v + step.1);
         if step.0 * step.0 + step.1 * step.1 < settling.step_px * settling.step_px {
-            return Some(Located { u, v, residual: square / f64::from(AREA) });
+            return Some(Located { u, v, residual: square / f64::from(PIXELS) });
         }
     }
     None
 }
-}
-
-/// 1 in the lanes that belong to the window.
-const ONES: Window = {
-    let mut row = [0.0; LANES];
-    let mut i = 0;
-    while i < SIDE {
-        row[i] = 1.0;
-        i += 1;
-    }
-    [row; SIDE]
-};
-
-/// Variance that smoothing by (1 2 1)/4 in both directions leaves of white noise of variance 1: (6/16)².
-const SMOOTHED: f64 = 36.0 / 256.0;
-/// How much noise of that variance fitting the mean and the contrast takes from a window: both are
-/// patterns so coarse that smoothing leaves nearly all of their share, .9 and .8.
-const BRIGHTNESS_AND_CONTRAST: f64 = 1.7;
-
-#[inline(always)]
-fn dot(a: &Window, b: &Window) -> f64 {
-    let mut sum = [0.0_f32; LANES];
-    for row in 0..SIDE {
-        for i in 0..LANES {
-            sum[i] += a[row][i] * b[row][i];
-        }
-    }
-    total(&sum)
-}
-
-vectorised! {
-/// Σ of a², a b and b² of two windows smoothed by (1 2 1)/4 in both directions, zero around them.
-smoothed_products(a: &Window, b: &Window) -> [f64; 3] {
-    let (a, b) = (smoothed(a), smoothed(b));
-    let mut sums = [[0.0_f32; LANES]; 3];
-    for row in 0..SIDE + 2 {
-        for i in 0..LANES {
-            sums[0][i] += a[row][i] * a[row][i];
-            sums[1][i] += a[row][i] * b[row][i];
-            sums[2][i] += b[row][i] * b[row][i];
-        }
-    }
-    sums.map(|sum| {
-        let mut all = 0.0;
-        for lane in &sum {
-            all += lane;
-        }
-        f64::from(all)
-    })
-}
-}
-
-/// The window with a margin of one pixel, which lies in lane 15 on its left side.
-#[inline(always)]
-fn smoothed(window: &Window) -> [[f32; LANES]; SIDE + 2] {
-    let mut out = [[0.0_f32; LANES]; SIDE + 2];
-    for (row, values) in window.iter().enumerate() {
-        let mut line = [0.0_f32; LANES];
-        for i in 0..LANES {
-            line[i] = 0.25 * (values[(i + LANES - 1) % LANES] + values[(i + 1) % LANES]) + 0.5 * values[i];
-        }
-        for i in 0..LANES {
-            out[row][i] += 0.25 * line[i];
-            out[row + 1][i] += 0.5 * line[i];
-            out[row + 2][i] += 0.25 * line[i];
-        }
-    }
-    out
-}
-
-/// Sum over the lanes that belong to the window.
-#[inline(always)]
-fn total(lanes: &[f32; LANES]) -> f64 {
-    let mut sum = 0.0;
-    for lane in &lanes[..SIDE] {
-        sum += lane;
-    }
-    f64::from(sum)
-}
-
-/// Reduce to zero mean; the standard deviation, or `None` if it vanishes.
-#[inline(always)]
-fn standardise(values: &mut Window) -> Option<f32> {
-    let mut sum = [0.0_f32; LANES];
-    for row in values.iter() {
-        for i in 0..LANES {
-            sum[i] += row[i];
-        }
-    }
-    let mean = total(&sum) as f32 / AREA;
-    let mut square = [0.0_f32; LANES];
-    for row in values.iter_mut() {
-        for i in 0..LANES {
-            row[i] -= mean;
-            square[i] += row[i] * row[i];
-        }
-    }
-    let deviation = (total(&square) as f32 / AREA).sqrt();
-    (deviation > 0.1 && deviation.is_finite()).then_some(deviation)
 }
 
 #[cfg(test)]

@@ -4,8 +4,13 @@ use crate::geometry::{Grid, Image};
 use crate::simd::vectorised;
 use rayon::prelude::*;
 
-/// Levels of which the smaller side would be under this many pixels are not built.
+/// Least side of a level, in pixels: a smaller one holds no patch of the flow's search.
 const MIN_SIDE: usize = 8;
+/// Rows handled by one task; fixed, and large enough to be worth one.
+const STRIP_ROWS: usize = 32;
+/// Variance of one component of [`gradients`] caused by white noise of variance 1 in the image:
+/// Σ of the squared weights of ½(−1 0 1) × (3 10 3)/16.
+pub(super) const GRADIENT_NOISE_GAIN: f32 = 0.5 * (9.0 + 100.0 + 9.0) / 256.0;
 
 /// An image and its successively halved versions.
 ///
@@ -66,9 +71,6 @@ impl Pyramid {
     }
 }
 
-/// Rows handled by one task; fixed, and large enough to be worth one.
-const STRIP: usize = 32;
-
 /// Compute every row of `out`, which gets the given size, from its index; `scratch` makes a buffer per task.
 pub(super) fn fill_rows<S>(
     out: &mut Image,
@@ -79,10 +81,10 @@ pub(super) fn fill_rows<S>(
     if out.size() != (width, height) {
         *out = Grid::filled(width, height, 0.0);
     }
-    out.values_mut().par_chunks_mut(width.max(1) * STRIP).enumerate().for_each(|(strip, rows)| {
+    out.values_mut().par_chunks_mut(width.max(1) * STRIP_ROWS).enumerate().for_each(|(strip, rows)| {
         let mut scratch = scratch();
         for (k, out) in rows.chunks_exact_mut(width.max(1)).enumerate() {
-            row(&mut scratch, strip * STRIP + k, out);
+            row(&mut scratch, strip * STRIP_ROWS + k, out);
         }
     });
 }
@@ -162,19 +164,15 @@ halve_row(rows: [&[f32]; 5], line: &mut [f32], out: &mut [f32]) {
 
 /// Derivatives of an image.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Gradients {
+pub(super) struct Gradients {
     /// ∂I/∂u, in grey levels per pixel.
     pub du: Grid<f32>,
     /// ∂I/∂v, in grey levels per pixel.
     pub dv: Grid<f32>,
 }
 
-/// Variance of one component of [`gradients`] caused by white noise of variance 1 in the image:
-/// Σ of the squared weights of ½(−1 0 1) × (3 10 3)/16.
-pub const GRADIENT_NOISE_GAIN: f32 = 0.5 * (9.0 + 100.0 + 9.0) / 256.0;
-
 /// Scharr's 3×3 derivatives, ½(−1 0 1) along and (3 10 3)/16 across; border pixels repeated.
-pub fn gradients(image: &Image) -> Gradients {
+pub(super) fn gradients(image: &Image) -> Gradients {
     let (width, height) = image.size();
     let mut du = Grid::filled(width, height, 0.0_f32);
     let mut dv = du.clone();

@@ -8,6 +8,9 @@ use crate::geometry::{Grid, Image, StereoRectification};
 use crate::simd::vectorised;
 use nalgebra::Vector2;
 
+/// How far a raw place may lie beyond the centres of the border pixels and still belong to them, in pixels.
+const HALF_PIXEL: f64 = 0.5;
+
 /// Turns the raw images of a pair into rectified ones.
 ///
 /// Grey levels between pixels are those of a cubic spline: a bilinear mean would take up to half of the
@@ -26,9 +29,6 @@ pub struct RectificationMap {
     unseen: Grid<bool>,
     raw: (usize, usize),
 }
-
-/// A raw place so far beyond the centres of the border pixels still belongs to these pixels.
-const PIXEL_HALF: f64 = 0.5;
 
 impl Rectifier {
     /// Compute the maps of both images.
@@ -72,7 +72,7 @@ impl RectificationMap {
             for (u, (place, unseen)) in places.iter_mut().zip(unseen).enumerate() {
                 if let Some(found) = from(u as f64, v as f64) {
                     let within = found.sup(&Vector2::zeros()).inf(&last);
-                    *unseen = (found - within).amax() > PIXEL_HALF;
+                    *unseen = (found - within).amax() > HALF_PIXEL;
                     *place = [within.x as f32, within.y as f32];
                 }
             }

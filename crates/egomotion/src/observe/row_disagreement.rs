@@ -10,16 +10,16 @@ use super::patch::{Freedom, Patch, Settling};
 use super::stereo_pyramid::StereoPyramid;
 use crate::geometry::{StereoRig, upper_median};
 
-/// The image is looked at in so many regions each way: a calibration error varies over the image.
+/// Regions into which the image is divided each way: a calibration error varies over the image.
 const REGIONS: usize = 3;
 /// Fewest matches that make a region's median.
 const LEAST_MATCHES: usize = 8;
-/// Matches looked at; more do not make the median better than the regions differ.
+/// Most matches looked at; more do not make the median better than the regions differ.
 const MOST_MATCHES: usize = 500;
-/// Rows further apart than this are mismatches, in pixels.
-const FARTHEST_PX: f64 = 3.0;
+/// Rows further apart than this, in pixels, are mismatches.
+const LARGEST_DISAGREEMENT_PX: f64 = 3.0;
 
-/// A hundredth of a pixel is well below what calibrations are judged by.
+/// When a match is located: two hundredths of a pixel are well below what calibrations are judged by.
 const SETTLING: Settling = Settling { iterations: 25, step_px: 0.02 };
 
 /// Root mean square over the regions of the image of the median vertical disparity, in pixels.
@@ -38,7 +38,7 @@ pub fn row_disagreement(frame: &StereoPyramid, tracks: &[StereoTrack], rig: &Ste
             let right = patch.locate(&frame.right_spline, start, Freedom::Plane, SETTLING)?;
             let column = (u as usize * REGIONS / rig.width_px.max(1)).min(REGIONS - 1);
             let row = (v as usize * REGIONS / rig.height_px.max(1)).min(REGIONS - 1);
-            ((right.v - v).abs() < FARTHEST_PX).then_some((row * REGIONS + column, right.v - v))
+            ((right.v - v).abs() < LARGEST_DISAGREEMENT_PX).then_some((row * REGIONS + column, right.v - v))
         })
         .collect();
     let medians: Vec<f64> = (0..REGIONS * REGIONS)

@@ -6,9 +6,9 @@ use crate::simd::vectorised;
 
 /// Half the side of the compared windows, in pixels of half resolution.
 const RADIUS: usize = 4;
-/// Side of the compared windows.
+/// Side of the compared windows, in pixels of half resolution.
 const SIDE: usize = 2 * RADIUS + 1;
-/// Shifts that are compared at a time.
+/// Shifts that are compared at a time, so that they vectorise.
 const LANES: usize = 16;
 /// The best shift's cost must be below this share of that of any other but its neighbours.
 const UNIQUENESS: f32 = 0.85;
@@ -16,7 +16,7 @@ const UNIQUENESS: f32 = 0.85;
 /// Shift u_left − u_right of the pixel (u, v), 0 to `largest_px`, to two pixels; `None` if not clearly the best.
 ///
 /// The cost is the sum of absolute differences of windows reduced to zero mean.
-pub fn search_row(frame: &StereoPyramid, u: usize, v: usize, largest_px: usize) -> Option<f64> {
+pub(super) fn search_row(frame: &StereoPyramid, u: usize, v: usize, largest_px: usize) -> Option<f64> {
     let level = usize::from(frame.left.levels().len() > 1);
     let size = 1 << level;
     let (left, right) = (frame.left.levels().get(level)?, frame.right.levels().get(level)?);

@@ -6,7 +6,15 @@ use rayon::prelude::*;
 use super::disparity::{DisparityMap, GUESS_SIGMA_PX};
 use super::flow::FlowField;
 use super::observation::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
-use crate::geometry::{Gaussian, StereoRig};
+use crate::geometry::{Gaussian, RigidMotion, StereoRig};
+
+/// Standard deviation of a place that nothing but the motion tells, in pixels: a larger one lets the surface slide
+/// further under a point.
+const SLIDING_SIGMA_PX: f64 = 3.0;
+/// Noise beside which a disparity may be that of the surface, in standard deviations.
+const SURFACE_NOISE_SIGMAS: f64 = 3.0;
+/// Slope of disparity, in pixels per pixel, from which on the stencil of a gradient straddles a depth edge.
+const EDGE_SLOPE: f64 = 1.0;
 
 /// The dense fields of one pair of frames.
 #[derive(Debug, Clone, Copy)]
@@ -21,8 +29,9 @@ pub struct DensePair<'a> {
     pub flow: &'a FlowField,
     /// Flow of the right camera from t to t′; only the differential binocular flow needs it.
     pub flow_right: Option<&'a FlowField>,
-    /// Whether disparity was given and not matched: its errors are then no part of those of places in the images.
-    pub given: bool,
+    /// Whether disparity was handed in by somebody else, as by a depth camera, and not matched: its errors are then no
+    /// part of those of places in the images.
+    pub external_disparity: bool,
 }
 
 impl DensePair<'_> {
@@ -60,7 +69,7 @@ impl DensePair<'_> {
     pub(super) fn before(&self, u: usize, v: usize) -> Option<Gaussian<3>> {
         let (mut d, mut variance) = self.disparity(u, v)?;
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
-        if self.given {
+        if self.external_disparity {
             let (surface, _) = surface_at(self.rig, self.before, x, y)?;
             (d, variance) = (surface.value(), surface.variance());
         }
@@ -87,7 +96,7 @@ impl DensePair<'_> {
         let mut before = self.before(u, v)?;
         let moved = self.displacement(u, v)?;
         let (x, y) = (before.mean.x + moved.mean.x, before.mean.y + moved.mean.y);
-        if self.given {
+        if self.external_disparity {
             let (later, cross) = self.later(x, y, &moved.cov)?;
             let mean = Vector3::new(x, y, later.value());
             return Some(StereoTrack {
@@ -110,7 +119,7 @@ impl DensePair<'_> {
         let (d, variance) = self.disparity(u, v)?;
         let moved = self.displacement(u, v)?;
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
-        let place = if self.given { moved.cov } else { 0.5 * moved.cov };
+        let place = if self.external_disparity { moved.cov } else { 0.5 * moved.cov };
         let (later, _) = self.later(x + moved.mean.x, y + moved.mean.y, &place)?;
         Some(Gaussian::independent([d, later.value()], [variance, later.variance()]))
     }
@@ -120,15 +129,52 @@ impl DensePair<'_> {
     /// d′ is read where flow says, so an error of flow moves it along the map's slope.
     #[inline(always)]
     fn later(&self, x: f64, y: f64, place: &Matrix2<f64>) -> Option<(Gaussian<1>, Vector2<f64>)> {
-        let (later, gradient) = match self.given {
+        let (later, gradient) = match self.external_disparity {
             true => surface_at(self.rig, self.after, x, y)?,
             false => disparity_at(self.rig, self.after, x, y)?,
         };
-        let shared = if self.given { 0.0 } else { shared_variance(place, later.variance()) };
+        let shared = if self.external_disparity { 0.0 } else { shared_variance(place, later.variance()) };
         let own = Vector2::new(shared, 0.0);
         let slope = place * gradient;
         let variance = later.variance() + gradient.dot(&slope) + 2.0 * own.dot(&gradient);
         Some((Gaussian::scalar(later.value(), variance), own + slope))
+    }
+
+    /// The point of pixel (u, v) before, and the surface that the later map has where `motion` leads it.
+    ///
+    /// Where depth is measured at both times and flow is not, shape alone tells of motion. The point may lie anywhere
+    /// near where `motion` leads it as far as the images tell, so its place is all but unknown, and disparity changes
+    /// with the place along the map's slope. What is left to know is the motion across the surface, which is the depth
+    /// change constraint (11), n · V(P) = c with n the surface's normal, linearised at the motion instead of at rest.
+    /// A disparity further than `reach_px` from the predicted one is of another surface.
+    pub(crate) fn shape_track(
+        &self,
+        u: usize,
+        v: usize,
+        motion: &RigidMotion,
+        reach_px: f64,
+    ) -> Option<StereoTrack> {
+        let before = self.before(u, v)?;
+        let variance = before.cov.m33;
+        let led = self.rig.project(&motion.apply(&self.rig.point(&before.mean)?))?;
+        let (later_u, later_v) = self.rig.pixel_from_image(led.x, led.y);
+        let reading = self.after.read(later_u, later_v)?;
+        let found = self.rig.disparity_from_shift(reading.shift);
+        let surprise = (found - led.z).abs();
+        if found <= 0.0 || surprise > reach_px + SURFACE_NOISE_SIGMAS * (variance + reading.variance).sqrt() {
+            return None;
+        }
+        let slope = Vector2::new(reading.slope.0, reading.slope.1 / self.rig.aspect());
+        let place = Matrix2::identity() * (SLIDING_SIGMA_PX * SLIDING_SIGMA_PX);
+        let cross = place * slope;
+        let own = reading.variance + slope.dot(&cross);
+        let cov = Matrix3::new(
+            place.m11, 0.0, cross.x, //
+            0.0, place.m22, cross.y, //
+            cross.x, cross.y, own,
+        );
+        let after = Gaussian { mean: Vector3::new(led.x, led.y, found), cov };
+        Some(StereoTrack { before, after })
     }
 
     /// Discrete DCCE: disparity at the pixel at t and t′, its gradient at t′, and the displacement.
@@ -240,13 +286,12 @@ fn disparity_at(rig: &StereoRig, map: &DisparityMap, x: f64, y: f64) -> Option<(
     let d = rig.disparity_from_shift(shift);
     let sigma = map.sigma.sample(u, v)?;
     let gradient = Vector2::new(du, dv / rig.aspect());
-    // Beyond one pixel of disparity per pixel the stencil straddles a depth edge.
-    let on_surface = gradient.amax() < 1.0;
+    let on_surface = gradient.amax() < EDGE_SLOPE;
     let measured = sigma < f64::from(GUESS_SIGMA_PX);
     (d > 0.0 && on_surface && measured).then(|| (Gaussian::scalar(d, sigma * sigma), gradient))
 }
 
-/// The same of a given map, by the surface around: what is given need not be smooth.
+/// The same of an external map, by the surface around: such a map need not be smooth.
 fn surface_at(rig: &StereoRig, map: &DisparityMap, x: f64, y: f64) -> Option<(Gaussian<1>, Vector2<f64>)> {
     let (u, v) = rig.pixel_from_image(x, y);
     let reading = map.read(u, v)?;
@@ -281,7 +326,7 @@ mod tests {
             after: &slanted,
             flow: &flow,
             flow_right: None,
-            given: false,
+            external_disparity: false,
         };
         let tracks = pair.every(1, DensePair::stereo_track);
         assert!(tracks.len() > 40);

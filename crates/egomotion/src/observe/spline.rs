@@ -13,21 +13,23 @@ use crate::simd::vectorised;
 
 /// The pole of the cubic B-spline's inverse filter, √3 − 2.
 const POLE: f32 = -0.267_949_2;
-/// Rows are filtered along columns in strips of so many columns.
-const STRIP: usize = 64;
-/// After so many pixels the influence of one is below single precision.
+/// Columns that are filtered together down the image: wide enough for vectors, and narrow enough for the cache.
+const STRIP_COLUMNS: usize = 64;
+/// Pixels after which the influence of one is below single precision.
 const REACH: usize = 12;
+/// Reach of the filter that smooths and inverts at once, in pixels: beyond it lie 2·10⁻⁴ of the weight.
+const TAPS: usize = 6;
 
 /// Weights of the four coefficients around the fraction `t` (0 … 1) of a pixel.
 #[inline(always)]
-pub fn weights(t: f32) -> [f32; 4] {
+pub(super) fn weights(t: f32) -> [f32; 4] {
     let (s, t2) = (1.0 - t, t * t);
     let (a, d) = (s * s * s / 6.0, t2 * t / 6.0);
     [a, 2.0 / 3.0 - t2 + 0.5 * t2 * t, 2.0 / 3.0 - s * s + 0.5 * s * s * s, d]
 }
 
 /// Coefficients along rows only, for reading between the pixels of a row.
-pub fn row_coefficients(image: &Image) -> Image {
+pub(super) fn row_coefficients(image: &Image) -> Image {
     let mut out = image.clone();
     let width = image.width().max(1);
     out.values_mut().par_chunks_mut(width).for_each(filter);
@@ -35,14 +37,14 @@ pub fn row_coefficients(image: &Image) -> Image {
 }
 
 /// Coefficients in both directions, mirrored at the borders.
-pub fn coefficients(image: &Image) -> Image {
+pub(super) fn coefficients(image: &Image) -> Image {
     let mut out = row_coefficients(image);
     let (width, height) = out.size();
-    let strips: Vec<Vec<f32>> = (0..width.div_ceil(STRIP))
+    let strips: Vec<Vec<f32>> = (0..width.div_ceil(STRIP_COLUMNS))
         .into_par_iter()
         .map(|strip| {
-            let first = strip * STRIP;
-            let count = STRIP.min(width - first);
+            let first = strip * STRIP_COLUMNS;
+            let count = STRIP_COLUMNS.min(width - first);
             let mut rows: Vec<f32> =
                 (0..height).flat_map(|v| out.row(v)[first..first + count].iter().copied()).collect();
             filter_rows(&mut rows, count);
@@ -50,7 +52,7 @@ pub fn coefficients(image: &Image) -> Image {
         })
         .collect();
     for (strip, rows) in strips.iter().enumerate() {
-        let (first, count) = (strip * STRIP, STRIP.min(width - strip * STRIP));
+        let (first, count) = (strip * STRIP_COLUMNS, STRIP_COLUMNS.min(width - strip * STRIP_COLUMNS));
         for (v, row) in rows.chunks_exact(count).enumerate() {
             out.row_mut(v)[first..first + count].copy_from_slice(row);
         }
@@ -58,15 +60,12 @@ pub fn coefficients(image: &Image) -> Image {
     out
 }
 
-/// Reach of the filter that smooths and inverts at once, in pixels: beyond it lie 2·10⁻⁴ of the weight.
-const TAPS: usize = 6;
-
 /// Coefficients in both directions of the image smoothed by (1 2 1)/4 in both directions, in `out`,
 /// whose memory is used again; mirrored at the borders.
 ///
 /// The two filters multiply to ³⁄₂ (1 + cos ω)/(2 + cos ω), whose impulse response
 /// ³⁄₂ (δₖ − z^|k|/√3), z = √3 − 2, falls off so fast that it is cheaper summed than run as a recursion.
-pub fn smoothed_coefficients(image: &Image, out: &mut Image) {
+pub(super) fn smoothed_coefficients(image: &Image, out: &mut Image) {
     let (width, height) = image.size();
     let mut taps = [0.0_f32; TAPS + 1];
     let mut power = -1.5 / 3.0_f32.sqrt();
@@ -189,7 +188,7 @@ fn filter_rows(values: &mut [f32], width: usize) {
 
 /// Value at (u, v) in pixels from coefficients in both directions, mirrored at the border; `None` outside.
 #[inline]
-pub fn sample(coefficients: &Grid<f32>, u: f32, v: f32) -> Option<f32> {
+pub(super) fn sample(coefficients: &Grid<f32>, u: f32, v: f32) -> Option<f32> {
     let (width, height) = coefficients.size();
     if !(u >= 0.0 && v >= 0.0 && u <= width as f32 - 1.0 && v <= height as f32 - 1.0) {
         return None;

@@ -10,20 +10,20 @@ use super::stereo_pyramid::StereoPyramid;
 use crate::geometry::distribution::CHI2_1_P9973;
 use crate::geometry::{Gaussian, Image};
 
-/// A hundredth of a pixel is below what noise leaves.
+/// When a window is located: two hundredths of a pixel are below what noise leaves.
 const SETTLING: Settling = Settling { iterations: 12, step_px: 0.02 };
 /// Largest mean squared difference of two windows, in units of the window's own variance.
 const LARGEST_RESIDUAL: f64 = 0.2;
 /// A window found further from where flow leads, in pixels, is another one.
-const FARTHEST_PX: f64 = 1.5;
-/// Rows by which the two cameras may disagree about the vertical motion, in pixels.
+const FARTHEST_FROM_FLOW_PX: f64 = 1.5;
+/// Rows by which the two cameras may disagree about the vertical motion beside noise, in pixels.
 const ROWS_APART_PX: f64 = 0.5;
 /// A change of disparity further from what was expected, in pixels, belongs to another surface.
 const LARGEST_SURPRISE_PX: f64 = 3.0;
 
-/// Where a window is followed from, in pixels.
+/// A patch of the left image and how it moves, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Seen {
+pub(crate) struct PatchMotion {
     /// Pixel (u, v) of the left image at t.
     pub at: (f64, f64),
     /// u_left − u_right at t.
@@ -36,20 +36,20 @@ pub struct Seen {
 /// that leads to one.
 ///
 /// `None` near the border, without texture, or where a window is not found again.
-pub fn disparity_change(
+pub(crate) fn disparity_change(
     before: &StereoPyramid,
     after: &StereoPyramid,
-    seen: &Seen,
+    patch: &PatchMotion,
     expected: &[f64],
 ) -> Option<Gaussian<1>> {
-    let (u, v) = seen.at;
-    let guess = (u + seen.flow.0, v + seen.flow.1);
+    let (u, v) = patch.at;
+    let guess = (u + patch.flow.0, v + patch.flow.1);
     let left = follow(&before.left_spline, &after.left_spline, (u, v), guess)?;
-    let right_patch = Patch::new(&before.right_spline, u - seen.shift, v)?;
+    let right_patch = Patch::new(&before.right_spline, u - patch.shift, v)?;
     expected.iter().find_map(|change| {
-        let guess = (left.u - seen.shift - change, left.v);
-        let right = found(&right_patch, &after.right_spline, guess)?;
-        let (moved_left, moved_right) = (left.u - u, right.u - (u - seen.shift));
+        let guess = (left.u - patch.shift - change, left.v);
+        let right = locate(&right_patch, &after.right_spline, guess)?;
+        let (moved_left, moved_right) = (left.u - u, right.u - (u - patch.shift));
         let apart = (right.v - left.v).powi(2);
         let plausible = apart < ROWS_APART_PX.powi(2) + CHI2_1_P9973 * (left.variance_v + right.variance_v);
         let value = moved_left - moved_right;
@@ -58,21 +58,21 @@ pub fn disparity_change(
     })
 }
 
-/// A window found again.
-struct Found {
+/// A window located again, with the variances of its place.
+struct LocatedWindow {
     u: f64,
     v: f64,
     variance_u: f64,
     variance_v: f64,
 }
 
-fn follow(from: &Image, to: &Image, at: (f64, f64), guess: (f64, f64)) -> Option<Found> {
-    found(&Patch::new(from, at.0, at.1)?, to, guess)
+fn follow(from: &Image, to: &Image, at: (f64, f64), guess: (f64, f64)) -> Option<LocatedWindow> {
+    locate(&Patch::new(from, at.0, at.1)?, to, guess)
 }
 
-fn found(patch: &Patch, to: &Image, guess: (f64, f64)) -> Option<Found> {
+fn locate(patch: &Patch, to: &Image, guess: (f64, f64)) -> Option<LocatedWindow> {
     let located = patch.locate(to, guess, Freedom::Plane, SETTLING)?;
-    let near = (located.u - guess.0).hypot(located.v - guess.1) < FARTHEST_PX;
+    let near = (located.u - guess.0).hypot(located.v - guess.1) < FARTHEST_FROM_FLOW_PX;
     let alike = located.residual < LARGEST_RESIDUAL * patch.contrast().powi(2);
     if !(near && alike) {
         return None;
@@ -80,7 +80,7 @@ fn found(patch: &Patch, to: &Image, guess: (f64, f64)) -> Option<Found> {
     let localisation = patch.localisation()?;
     let noise = located.residual / localisation.left_over;
     let (variance_u, variance_v) = (noise * localisation.plane.m11, noise * localisation.plane.m22);
-    Some(Found { u: located.u, v: located.v, variance_u, variance_v })
+    Some(LocatedWindow { u: located.u, v: located.v, variance_u, variance_v })
 }
 
 #[cfg(test)]
@@ -99,7 +99,7 @@ mod tests {
         let image = |du: f64, dv: f64| Grid::from_fn(120, 90, |u, v| grey(u as f64 - du, v as f64 - dv));
         let before = StereoPyramid::new(&image(0.0, 0.0), &image(-12.0, 0.0), 2);
         let after = StereoPyramid::new(&image(2.4, -1.1), &image(2.4 - 13.3, -1.1), 2);
-        let seen = Seen { at: (60.0, 45.0), shift: 12.0, flow: (2.2, -1.0) };
+        let seen = PatchMotion { at: (60.0, 45.0), shift: 12.0, flow: (2.2, -1.0) };
         let change = disparity_change(&before, &after, &seen, &[0.8]).unwrap();
         assert!((change.value() - 1.3).abs() < 0.02, "{}", change.value());
         assert!(change.variance() > 0.0 && change.variance() < 0.01);

@@ -9,124 +9,32 @@
 //! as long as it is found. Its window is taken anew in every frame. Nothing drifts, because a
 //! pair's motion is measured between two places of the same window, whatever corner it once was.
 //!
-//! Where disparity is given in place of a right image ([`Hints::given`]), it is read from the map.
+//! Where disparity is handed in from outside in place of a right image ([`Hints::external_disparity`]), it is read from the map.
 
-use documented::DocumentedFields;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-use super::corners::{Cells, corners};
-use super::disparity::DisparityMap;
-use super::follow::{Follower, Time};
+use super::corners::{Corner, CornerCells, corners};
+use super::follow::{Across, Follower, Time, is_masked};
 use super::observation::StereoTrack;
 use super::patch::{self, Localisation};
 use super::row_search::search_row;
 use super::stereo_pyramid::StereoPyramid;
-use crate::geometry::{Field, Gaussian, Grid, StereoRig, Twist, upper_median};
+use crate::geometry::{Gaussian, Grid, StereoRig, upper_median};
 
-/// How corners are found and followed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
-#[serde(default, deny_unknown_fields)]
-pub struct TrackOptions {
-    /// About how many corners are followed.
-    pub corners: usize,
-    /// Corners weaker than this are not used, in (grey levels per pixel)².
-    pub least_strength: f32,
-    /// Levels of the image pyramid.
-    pub pyramid_levels: usize,
-    /// Largest disparity that is searched, in pixels.
-    pub largest_disparity_px: usize,
-    /// Most iterations of one localisation.
-    pub iterations: usize,
-    /// Largest distance after following a corner there and back, in pixels.
-    pub back_tolerance_px: f64,
-    /// Largest root mean square difference of two windows, as a share of the window's contrast.
-    pub largest_residual: f64,
-}
+pub use super::follow::{Hints, SearchStart, StereoCorner, Trace, TrackOptions};
 
-impl Default for TrackOptions {
-    fn default() -> Self {
-        Self {
-            corners: 1200,
-            least_strength: 4.0,
-            pyramid_levels: 5,
-            largest_disparity_px: 128,
-            iterations: 25,
-            back_tolerance_px: 0.5,
-            largest_residual: 0.5,
-        }
-    }
-}
-
-/// What is known before tracking.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Hints<'a> {
-    /// Dense disparity of the earlier frame, as shifts u_left − u_right in pixels.
-    pub shift: Option<&'a Field>,
-    /// Expected scene motion, left camera.
-    pub motion: Option<&'a Twist>,
-    /// Pixels of the left image never to use, where `true`.
-    pub mask: Option<&'a Grid<bool>>,
-    /// The same of the right image.
-    pub mask_right: Option<&'a Grid<bool>>,
-    /// Disparity of the earlier and the later frame, which takes the place of their right images.
-    pub given: Option<[&'a DisparityMap; 2]>,
-}
-
-/// How far a corner may be from where it is expected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Expected {
-    /// Within a pixel or two: it is looked for at full resolution at once.
-    Near,
-    /// Within so many pixels as the window has at this level of the pyramid, from which the search starts.
-    FromLevel(usize),
-}
-
-/// A corner of a frame, located in both its images.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct StereoCorner {
-    /// Column in the left image, in pixels.
-    pub u: f64,
-    /// Row in both images, in pixels.
-    pub v: f64,
-    /// u_left − u_right, in pixels.
-    pub shift: f64,
-    /// Number of frames before this one in which it was seen.
-    pub age: u32,
-    /// How noise moves its place.
-    pub(super) localisation: Localisation,
-    /// How its disparity was found.
-    pub(super) across: Across,
-}
-
-/// How the disparity of a corner was found.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) enum Across {
-    /// In the right image.
-    Matched {
-        /// Mean squared difference of the left and the right window.
-        residual: f64,
-    },
-    /// In a given map.
-    Read {
-        /// Variance of the disparity, in px².
-        variance: f64,
-        /// Its change per pixel in u and in v.
-        slope: (f64, f64),
-    },
-}
-
-/// A corner in two frames.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Trace {
-    /// In the earlier frame.
-    pub before: StereoCorner,
-    /// In the later frame.
-    pub after: StereoCorner,
-    /// Mean squared difference of the two left windows.
-    pub(super) residual: f64,
-}
+/// Variance of a grey level rounded to whole numbers, in squared grey levels: the least that an image can have.
+const QUANTISATION: f64 = 1.0 / 12.0;
+/// A window's own variance of grey levels counts where it is this many times the pair's: a window has some twenty
+/// independent grey levels, whose chance scatters it by a third.
+const OWN_VARIANCE_RATIO: f64 = 1.8;
+/// Variance of a grey level where no match tells it, in squared grey levels.
+const UNKNOWN_VARIANCE: f64 = 1.0;
+/// Least side of the cells that corners are spread over, in pixels.
+const LEAST_CELL_PX: f64 = 4.0;
+/// Border that is kept free of corners beyond the reach of a window, in pixels.
+const BORDER_PX: usize = 3;
 
 /// The corners of a frame: those `kept` from following earlier ones, and new ones where there are none; the order is fixed.
 pub fn stereo_corners(
@@ -137,8 +45,8 @@ pub fn stereo_corners(
     options: &TrackOptions,
 ) -> Vec<StereoCorner> {
     let (width, height) = frame.left.size();
-    let cell = ((width * height) as f64 / options.corners.max(1) as f64).sqrt().max(4.0) as usize;
-    let cells = Cells::new((width, height), cell, patch::RADIUS + 3);
+    let cell = ((width * height) as f64 / options.corners.max(1) as f64).sqrt().max(LEAST_CELL_PX) as usize;
+    let cells = CornerCells::new((width, height), cell, patch::RADIUS + BORDER_PX);
     let (across, down) = cells.count();
     let mut taken = Grid::filled(across, down, false);
     let mut claim = |corner: &&StereoCorner| {
@@ -154,11 +62,12 @@ pub fn stereo_corners(
     if let Some(mask) = hints.mask {
         found.retain(|c| !is_masked(mask, c.u as f64, c.v as f64));
     }
-    let follower = Follower { before: frame, after: frame, rig, hints, options, expected: Expected::Near };
-    let locate = |corner: &super::corners::Corner| {
+    let follower =
+        Follower { before: frame, after: frame, rig, hints, options, start: SearchStart::FullResolution };
+    let locate = |corner: &Corner| {
         let shift = match hints.shift {
             Some(field) => f64::from(field.get(corner.u, corner.v)?),
-            None if hints.given.is_some() => 0.0,
+            None if hints.external_disparity.is_some() => 0.0,
             None => search_row(frame, corner.u, corner.v, options.largest_disparity_px)?,
         };
         follower.across(frame, Time::Earlier, (corner.u as f64, corner.v as f64), shift, 0)
@@ -168,12 +77,6 @@ pub fn stereo_corners(
     all
 }
 
-/// Whether a place belongs to a masked pixel.
-pub(super) fn is_masked(mask: &Grid<bool>, u: f64, v: f64) -> bool {
-    let (u, v) = (u.round() as usize, v.round() as usize);
-    u < mask.width() && v < mask.height() && mask.at(u, v)
-}
-
 /// Corners of `before` followed to `after`; the order is theirs.
 pub fn follow(
     before: &StereoPyramid,
@@ -181,16 +84,16 @@ pub fn follow(
     corners: &[StereoCorner],
     rig: &StereoRig,
     hints: Hints<'_>,
-    expected: Expected,
+    start: SearchStart,
     options: &TrackOptions,
 ) -> Vec<Trace> {
-    let follower = Follower { before, after, rig, hints, options, expected };
+    let follower = Follower { before, after, rig, hints, options, start };
     let traces: Vec<Option<Trace>> = corners.par_iter().map(|corner| follower.trace(corner)).collect();
     traces.into_iter().flatten().collect()
 }
 
-/// The measurements of all traces of a pair, with covariances from the noise that they share.
-pub fn measured(traces: &[Trace], rig: &StereoRig) -> Vec<StereoTrack> {
+/// The tracks that all traces of a pair measure, with covariances from the noise that they share.
+pub fn tracks_from_traces(traces: &[Trace], rig: &StereoRig) -> Vec<StereoTrack> {
     let noise = GreyNoise::of(traces);
     traces.iter().filter_map(|trace| trace.track(rig, noise)).collect()
 }
@@ -206,8 +109,8 @@ pub fn stereo_tracks(
     options: &TrackOptions,
 ) -> Vec<StereoTrack> {
     let corners = stereo_corners(before, &[], rig, hints, options);
-    let expected = hints.motion.map_or(Expected::FromLevel(usize::MAX), |_| Expected::Near);
-    measured(&follow(before, after, &corners, rig, hints, expected, options), rig)
+    let start = hints.motion.map_or(SearchStart::Level(usize::MAX), |_| SearchStart::FullResolution);
+    tracks_from_traces(&follow(before, after, &corners, rig, hints, start, options), rig)
 }
 
 /// Variance of a grey level of one image, as the matches show it.
@@ -232,17 +135,13 @@ impl GreyNoise {
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
-    upper_median(&mut values, f64::total_cmp).unwrap_or(1.0)
+    upper_median(&mut values, f64::total_cmp).unwrap_or(UNKNOWN_VARIANCE)
 }
 
-/// A window's own variance counts where it is more than chance makes of the pair's: a window has
-/// some twenty independent grey levels, which scatter it by a third.
+/// The variance of grey levels of one window, from the pair's and its own.
 fn at_least(pooled: f64, own: f64) -> f64 {
-    pooled.max(own / 1.8).max(QUANTISATION)
+    pooled.max(own / OWN_VARIANCE_RATIO).max(QUANTISATION)
 }
-
-/// Variance of a grey level rounded to whole numbers, the least that an image can have.
-const QUANTISATION: f64 = 1.0 / 12.0;
 
 impl Trace {
     /// Variance of a grey level from the two left windows.
@@ -255,7 +154,7 @@ impl Trace {
         let time = at_least(noise.time, self.grey_variance());
         let end = |corner: &StereoCorner| {
             let rig_noise = corner.grey_variance().map_or(noise.rig, |own| at_least(noise.rig, own));
-            corner.measured(rig, GreyNoise { time, rig: rig_noise })
+            corner.observed(rig, GreyNoise { time, rig: rig_noise })
         };
         let (before, after) = (end(&self.before), end(&self.after));
         (before.mean.z > 0.0 && after.mean.z > 0.0).then_some(StereoTrack { before, after })
@@ -272,7 +171,7 @@ impl StereoCorner {
     }
 
     /// (x, y, d) given the variances of grey levels.
-    fn measured(&self, rig: &StereoRig, noise: GreyNoise) -> Gaussian<3> {
+    fn observed(&self, rig: &StereoRig, noise: GreyNoise) -> Gaussian<3> {
         let (x, y) = rig.image_from_pixel(self.u, self.v);
         let Localisation { plane, plane_row, row, .. } = &self.localisation;
         let ratio = rig.aspect();

@@ -4,13 +4,10 @@ use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::estimate::LmedsOptions;
-use crate::estimate::MaximumLikelihoodOptions;
-use crate::estimate::StudentT;
-use crate::estimate::Tolerance;
+use crate::estimate::{LmedsOptions, MaximumLikelihoodOptions, StudentT, Tolerance};
 use crate::geometry::RigError;
 use crate::motion::Vehicle;
-use crate::observe::disparity::AreaOptions;
+use crate::observe::disparity::DisparityExpert;
 use crate::observe::flow::FlowError;
 use crate::observe::{DisparityOptions, FlowOptions, TrackOptions};
 
@@ -135,7 +132,7 @@ pub fn meaning(path: &[&str]) -> Option<&'static str> {
         ["vehicle", name] => of::<Vehicle>(name),
         ["tracks", name] => of::<TrackOptions>(name),
         ["disparity", name] => of::<DisparityOptions>(name),
-        ["disparity", "area", name] => of::<AreaOptions>(name),
+        ["disparity", "expert", name] => of::<DisparityExpert>(name),
         ["flow", name] => of::<FlowOptions>(name),
         ["irls", name] | ["maximum_likelihood", "kernel", name] => of::<StudentT>(name),
         ["lmeds", name] => of::<LmedsOptions>(name),
@@ -242,7 +239,6 @@ impl Config {
             (self.tracks.back_tolerance_px > 0.0, "tracks.back_tolerance_px must be positive"),
             (self.tracks.largest_residual > 0.0, "tracks.largest_residual must be positive"),
             (self.disparity.levels >= 1, "disparity.levels must be at least 1"),
-            (self.disparity.refinement_steps >= 1, "disparity.refinement_steps must be at least 1"),
             (kernels.iter().all(|k| k.nu > 0.0 && k.nu.is_finite()), "nu must be positive and finite"),
             (kernels.iter().all(|k| k.iterations >= 1), "iterations must be at least 1"),
             (kernels.iter().all(|k| k.tolerance > 0.0), "tolerance must be positive"),

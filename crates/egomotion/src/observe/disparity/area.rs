@@ -5,56 +5,94 @@
 //! each column are kept from row to row, the sum of a window from pixel to pixel, so that the time
 //! depends on the number of levels alone and not on the window.
 
-use documented::DocumentedFields;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-use super::check::{Claims, NO_LEVEL, Winner};
-use super::lanes::{Bytes, Kernel, LANES, widest};
-use super::slopes::{Slopes, ZERO};
+use super::DisparityExpert;
+use super::smoothing::Smoothed;
+use super::winners::{Claims, NO_LEVEL, Winner};
+use crate::geometry::Image;
+use crate::simd::{Bytes, Kernel, LANES, widest};
 
 /// Rows answered by one strip. The strips are fixed, so the answer does not depend on the threads.
 const STRIP_ROWS: usize = 48;
-/// Largest half window, for which the sum of all differences fits into 16 bits.
-const LARGEST_RADIUS: usize = 10;
-/// Fraction of a pixel to which disparity is told.
+/// Largest half window, in pixels, for which the sum of all differences fits into 16 bits.
+const LARGEST_RADIUS_PX: usize = 10;
+/// Levels by which the disparity found from the right image may differ: a larger number lets more false matches
+/// through, and 0 drops slanted surfaces.
+const LEFT_RIGHT_TOLERANCE: usize = 1;
+/// Fraction of a pixel to which disparity is told, that of the stereo cameras of the paper.
 const RESOLUTION_PX: f32 = 1.0 / 16.0;
 /// Pixels that the smoothing by (1, 2, 1)/4 both ways makes one observation: 1/Σw².
 const SMOOTHED_PIXELS: f32 = (16.0 / 6.0) * (16.0 / 6.0);
 /// Growth of the variance for the depth inside a window that no one disparity fits; measured on
 /// Middlebury and KITTI pairs.
-const MISFIT: f32 = 1.7;
-/// What no image noise explains, in pixels: the shape of the cost between the levels.
+const DEPTH_MISFIT: f32 = 1.7;
+/// Standard deviation that no image noise explains, in pixels: the shape of the cost between the levels.
 const MODEL_SIGMA_PX: f32 = 0.05;
+/// The byte of no slope.
+const ZERO_SLOPE: u8 = 63;
+/// Largest slope told apart, either way, in quarters of a grey level of 8 bits per pixel.
+const LARGEST_SLOPE: i32 = 63;
+/// Bits by which the difference of two neighbours is shifted: slopes of an 8-bit image count in
+/// quarters of a grey level per pixel.
+const SLOPE_SHIFT: u32 = 6;
 
-/// How areas are correlated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, DocumentedFields)]
-#[serde(default, deny_unknown_fields)]
-pub struct AreaOptions {
-    /// Half width of the square window, at most 10 pixels.
-    pub radius: usize,
-    /// A winner's cost must be lower than every rival's by this fraction, 0 … 1.
-    pub uniqueness: f32,
-    /// Least mean absolute slope of a window, in quarters of a grey level of 8 bits per pixel.
-    pub texture: f32,
-    /// Levels by which the disparity found from the right image may differ.
-    pub left_right_tolerance: usize,
+/// The horizontal slope of an image in bytes, row by row.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Slopes {
+    smoothed: Smoothed,
+    bytes: Vec<u8>,
+    width: usize,
 }
 
-impl Default for AreaOptions {
-    fn default() -> Self {
-        Self { radius: 4, uniqueness: 0.1, texture: 1.0, left_right_tolerance: 1 }
+impl Slopes {
+    /// The slopes of `image` smoothed by (1, 2, 1)/4 both ways, of the last column first if `mirrored`.
+    pub(super) fn compute(&mut self, image: &Image, scale: f32, mirrored: bool) {
+        self.width = image.width();
+        self.smoothed.compute(image, 1, scale, mirrored);
+        self.bytes.resize(image.values().len(), 0);
+        let Self { smoothed, bytes, width } = self;
+        // In the mirrored image the slope has the other sign.
+        let sign = if mirrored { -1 } else { 1 };
+        bytes.par_chunks_mut((*width).max(1)).enumerate().for_each(|(v, bytes)| {
+            widest(HorizontalSlope { smoothed: smoothed.row(v), bytes, sign });
+        });
+    }
+
+    /// Row `v`.
+    pub(super) fn row(&self, v: usize) -> &[u8] {
+        &self.bytes[v * self.width..(v + 1) * self.width]
+    }
+}
+
+struct HorizontalSlope<'a> {
+    /// From one pixel before the first on.
+    smoothed: &'a [i16],
+    bytes: &'a mut [u8],
+    sign: i32,
+}
+
+impl Kernel for HorizontalSlope<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<B: Bytes>(self) {
+        let n = self.bytes.len();
+        let (before, after) = (&self.smoothed[..n], &self.smoothed[2..n + 2]);
+        for (byte, (before, after)) in self.bytes.iter_mut().zip(before.iter().zip(after)) {
+            let difference = (self.sign * (i32::from(*after) - i32::from(*before))) >> SLOPE_SHIFT;
+            *byte = (difference.clamp(-LARGEST_SLOPE, LARGEST_SLOPE) + i32::from(ZERO_SLOPE)) as u8;
+        }
     }
 }
 
 /// The work space of all strips.
 #[derive(Debug, Clone, Default)]
 pub(super) struct AreaCorrelation {
-    strips: Vec<Strip>,
+    strips: Vec<AreaStrip>,
 }
 
 /// What is matched, and how.
-pub(super) struct Pair<'a> {
+pub(super) struct SlopePair<'a> {
     /// Slopes of the left image.
     pub left: &'a Slopes,
     /// Slopes of the right image, its last column first.
@@ -63,14 +101,14 @@ pub(super) struct Pair<'a> {
     pub height: usize,
     /// Number of levels, 1 … width.
     pub levels: usize,
-    pub options: &'a AreaOptions,
+    pub options: &'a DisparityExpert,
 }
 
 impl AreaCorrelation {
     /// The winning disparity of every pixel, to 1/16 pixel, and its standard deviation; NaN where no
     /// winner is to be believed.
-    pub(super) fn winners(&mut self, pair: &Pair<'_>, winners: &mut [f32], sigma: &mut [f32]) {
-        self.strips.resize_with(pair.height.div_ceil(STRIP_ROWS), Strip::default);
+    pub(super) fn winners(&mut self, pair: &SlopePair<'_>, winners: &mut [f32], sigma: &mut [f32]) {
+        self.strips.resize_with(pair.height.div_ceil(STRIP_ROWS), AreaStrip::default);
         let strip = STRIP_ROWS * pair.width;
         let answers = winners.par_chunks_mut(strip).zip(sigma.par_chunks_mut(strip));
         self.strips.par_iter_mut().zip(answers).enumerate().for_each(|(index, (strip, answers))| {
@@ -81,7 +119,7 @@ impl AreaCorrelation {
 
 /// One strip's work space.
 #[derive(Debug, Clone, Default)]
-struct Strip {
+struct AreaStrip {
     /// Per pixel and level the sum of the differences of its column's part of the window, after zeros
     /// for the pixel before the first.
     columns: Vec<u16>,
@@ -89,38 +127,38 @@ struct Strip {
     texture: Vec<u16>,
     /// Per level the sum over the window.
     sums: Vec<u16>,
-    enters: Line,
-    leaves: Line,
+    enters: SlopeRows,
+    leaves: SlopeRows,
     best: Vec<Winner>,
     claims: Claims,
 }
 
 /// A row of both images.
 #[derive(Debug, Clone, Default)]
-struct Line {
+struct SlopeRows {
     left: Vec<u8>,
     /// Mirrored, so that the candidates of rising disparity stand side by side, with a margin for
     /// levels beyond the row.
     right: Vec<u8>,
 }
 
-impl Line {
+impl SlopeRows {
     /// Row `v`; where there is none a row without slopes, which changes no sum.
-    fn take(&mut self, pair: &Pair<'_>, v: Option<usize>, margin: usize) {
+    fn take(&mut self, pair: &SlopePair<'_>, v: Option<usize>, margin: usize) {
         self.left.clear();
         self.right.clear();
         if let Some(v) = v {
             self.left.extend_from_slice(pair.left.row(v));
             self.right.extend_from_slice(pair.right.row(v));
         }
-        self.left.resize(pair.width, ZERO);
-        self.right.resize(pair.width + margin, ZERO);
+        self.left.resize(pair.width, ZERO_SLOPE);
+        self.right.resize(pair.width + margin, ZERO_SLOPE);
     }
 }
 
-impl Strip {
-    fn run(&mut self, pair: &Pair<'_>, first: usize, (winners, sigma): (&mut [f32], &mut [f32])) {
-        let radius = pair.options.radius.min(LARGEST_RADIUS);
+impl AreaStrip {
+    fn run(&mut self, pair: &SlopePair<'_>, first: usize, (winners, sigma): (&mut [f32], &mut [f32])) {
+        let radius = pair.options.area_radius_px.min(LARGEST_RADIUS_PX);
         let stride = pair.levels.next_multiple_of(LANES);
         self.columns.clear();
         self.columns.resize((pair.width + 1) * stride, 0);
@@ -145,23 +183,22 @@ impl Strip {
                 sums,
                 radius,
                 levels: pair.levels,
-                uniqueness: pair.options.uniqueness,
+                uniqueness: pair.options.area_uniqueness,
                 // The sum of a window; at the border less of it is inside.
-                least_texture: pair.options.texture * (rows * (2 * radius + 1)) as f32,
+                least_texture: pair.options.area_texture * (rows * (2 * radius + 1)) as f32,
                 best,
             });
             claims.of_winners(best);
-            let tolerance = pair.options.left_right_tolerance;
             let pixels = (rows * (2 * radius + 1)) as f32;
             for ((u, winner), (shift, sigma)) in best.iter().enumerate().zip(winners.iter_mut().zip(sigma)) {
-                let believed = winner.unique && claims.agree(u, winner.level, tolerance);
+                let believed = winner.unique && claims.agree(u, winner.level, LEFT_RIGHT_TOLERANCE);
                 (*shift, *sigma) = if believed { answer(winner, pixels) } else { (f32::NAN, f32::NAN) };
             }
         }
     }
 
     /// Which rows enter the columns and leave them next.
-    fn exchange(&mut self, pair: &Pair<'_>, enters: Option<usize>, leaves: Option<usize>) {
+    fn exchange(&mut self, pair: &SlopePair<'_>, enters: Option<usize>, leaves: Option<usize>) {
         let margin = pair.levels.next_multiple_of(LANES);
         self.enters.take(pair, enters, margin);
         self.leaves.take(pair, leaves, margin);
@@ -170,8 +207,8 @@ impl Strip {
 
 /// The columns' sums moved down by a row: one enters and one leaves.
 struct Exchange<'a> {
-    enters: &'a Line,
-    leaves: &'a Line,
+    enters: &'a SlopeRows,
+    leaves: &'a SlopeRows,
     columns: &'a mut [u16],
     texture: &'a mut [u16],
     stride: usize,
@@ -201,7 +238,7 @@ impl Exchange<'_> {
                 sums[i] = sums[i].wrapping_add(moved).wrapping_sub(old[i]);
             }
         }
-        let slope = |line: &Line| u16::from(line.left[u].abs_diff(ZERO));
+        let slope = |rows: &SlopeRows| u16::from(rows.left[u].abs_diff(ZERO_SLOPE));
         self.texture[u] = self.texture[u].wrapping_add(slope(enters)).wrapping_sub(slope(leaves));
     }
 }
@@ -280,7 +317,7 @@ fn answer(winner: &Winner, pixels: f32) -> (f32, f32) {
     // What would remain at the minimum itself.
     let least = (here - 0.5 * (before - after).abs()).max(0.0);
     let rise = (0.5 * (before + after) - least).max(1.0);
-    let variance = MISFIT * 0.5 * least * SMOOTHED_PIXELS / (pixels * rise);
+    let variance = DEPTH_MISFIT * 0.5 * least * SMOOTHED_PIXELS / (pixels * rise);
     let shift = (shift / RESOLUTION_PX).round() * RESOLUTION_PX;
     (shift, (variance + RESOLUTION_PX * RESOLUTION_PX / 12.0 + MODEL_SIGMA_PX * MODEL_SIGMA_PX).sqrt())
 }

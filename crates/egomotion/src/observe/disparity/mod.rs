@@ -6,27 +6,20 @@
 
 mod area;
 mod census;
-mod check;
-mod edges;
-mod fill;
-mod lanes;
+mod compare;
+mod depth_edges;
 mod lucas_kanade;
 mod reading;
-mod rows;
 mod semi_global;
-mod slopes;
 mod smoothing;
-mod speckles;
 mod subpixel;
-mod surface;
 mod sweep;
+mod winners;
 
 use documented::DocumentedFields;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-pub use area::AreaOptions;
-pub use census::CensusWindow;
 pub use reading::Reading;
 
 use crate::geometry::{Field, Image};
@@ -43,7 +36,7 @@ pub enum Matcher {
     AreaCorrelation,
 }
 
-/// How disparity is found. Penalties are in bits of the census words' Hamming distance.
+/// How disparity is found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisparityOptions {
@@ -51,30 +44,14 @@ pub struct DisparityOptions {
     pub levels: usize,
     /// Which matcher.
     pub matcher: Matcher,
-    /// Of the area correlation: its window and what it believes.
-    pub area: AreaOptions,
-    /// Neighbourhood compared.
-    pub census: CensusWindow,
-    /// P1: cost of a step of one level between neighbours, at most 54.
-    pub penalty_small: u8,
-    /// P2: cost of a jump between neighbours of equal grey level, at most 54.
-    pub penalty_large: u8,
-    /// The least that P2 becomes where the grey level jumps.
-    pub penalty_large_least: u8,
-    /// Grey-level difference that halves P2, in units of the image's mean difference of neighbours.
-    pub edge_contrast: f32,
-    /// A winner's cost must be lower than every rival's by this fraction, 0 … 1.
+    /// Semi-global matching: a winner's cost must be lower than every rival's by this fraction, 0 … 1.
     pub uniqueness: f32,
-    /// Levels by which the disparity found from the right image may differ.
-    pub left_right_tolerance: usize,
     /// Connected pieces of fewer pixels are removed.
     pub speckle_size: usize,
-    /// Difference of disparity that still connects neighbours, in pixels.
-    pub speckle_range: f32,
     /// Whether gaps no wider than `levels` are filled along the row, with a large standard deviation.
     pub fill: bool,
-    /// Steps of sub-pixel refinement, at least 1.
-    pub refinement_steps: usize,
+    /// For experts: settings that few have a reason to change.
+    pub expert: DisparityExpert,
 }
 
 impl Default for DisparityOptions {
@@ -82,21 +59,35 @@ impl Default for DisparityOptions {
         Self {
             levels: 128,
             matcher: Matcher::default(),
-            area: AreaOptions::default(),
-            census: CensusWindow::default(),
-            penalty_small: 10,
-            penalty_large: 54,
-            penalty_large_least: 24,
-            edge_contrast: 4.0,
             uniqueness: 0.01,
-            left_right_tolerance: 2,
             speckle_size: 100,
-            speckle_range: 1.0,
             fill: true,
-            refinement_steps: 2,
+            expert: DisparityExpert::default(),
         }
     }
 }
+
+/// For experts: how areas are correlated, which depends on the camera that [`Matcher::AreaCorrelation`] stands for.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, DocumentedFields)]
+#[serde(default, deny_unknown_fields)]
+pub struct DisparityExpert {
+    /// Area correlation: half width of the square window, at most 10 pixels.
+    pub area_radius_px: usize,
+    /// Area correlation: a winner's cost must be lower than every rival's by this fraction, 0 … 1.
+    pub area_uniqueness: f32,
+    /// Area correlation: least mean absolute slope of a window, in quarters of a grey level of 8 bits per pixel.
+    pub area_texture: f32,
+}
+
+impl Default for DisparityExpert {
+    fn default() -> Self {
+        Self { area_radius_px: 4, area_uniqueness: 0.1, area_texture: 1.0 }
+    }
+}
+
+/// Difference of disparity that still connects neighbours to one piece, in pixels: a larger one lets speckles hang on
+/// surfaces, a smaller one tears slanted surfaces to pieces.
+const SPECKLE_RANGE_PX: f32 = 1.0;
 
 /// Standard deviation from which on a disparity is a guess and no measurement, in pixels: all that
 /// is filled in, and where grey levels contradict the matching.
@@ -147,13 +138,13 @@ pub struct DisparityMatcher {
     left_words: census::Census,
     right_words: census::Census,
     semi_global: semi_global::SemiGlobal,
-    left_slopes: slopes::Slopes,
-    right_slopes: slopes::Slopes,
+    left_slopes: area::Slopes,
+    right_slopes: area::Slopes,
     area: area::AreaCorrelation,
     winners: Vec<f32>,
     /// Of the area correlation's winners.
     sigma: Vec<f32>,
-    speckles: speckles::Speckles,
+    speckles: winners::Speckles,
     refinement: subpixel::Refinement,
 }
 
@@ -190,10 +181,9 @@ impl DisparityMatcher {
             Matcher::AreaCorrelation => self.correlate_areas(left, right, levels),
         }
         let options = &self.options;
-        let (size, range) = (options.speckle_size, options.speckle_range);
-        self.speckles.remove(&mut self.winners, width, size, range);
+        self.speckles.remove(&mut self.winners, width, options.speckle_size, SPECKLE_RANGE_PX);
         if options.matcher == Matcher::SemiGlobal {
-            self.refinement.refine(left, right, &self.winners, options.refinement_steps.max(1));
+            self.refinement.refine(left, right, &self.winners);
         }
         let rows = map.shift.rows_mut().zip(map.sigma.rows_mut()).enumerate();
         rows.for_each(|(v, (to_shift, to_sigma))| {
@@ -207,36 +197,35 @@ impl DisparityMatcher {
                 *to_sigma = if shift.is_nan() { f32::NAN } else { *sigma };
             }
             if options.fill {
-                fill::fill_row(to_shift, to_sigma, levels);
+                depth_edges::fill_row(to_shift, to_sigma, levels);
             }
         });
         if options.matcher == Matcher::SemiGlobal {
-            edges::widen_beside_edges(&mut map);
+            depth_edges::widen_beside_edges(&mut map);
         }
         Ok(map)
     }
 
     fn match_semi_globally(&mut self, left: &Image, right: &Image, levels: usize) {
-        let options = &self.options;
         let scale = smoothing::grey_scale([left, right]);
-        self.left_words.compute(left, options.census, scale, false);
-        self.right_words.compute(right, options.census, scale, true);
+        self.left_words.compute(left, scale, false);
+        self.right_words.compute(right, scale, true);
         let (left_words, right_words) = (&self.left_words, &self.right_words);
-        let pair = semi_global::Pair { left, left_words, right_words, levels };
-        self.semi_global.winners(&pair, options, &mut self.winners);
+        let pair = semi_global::CensusPair { left, left_words, right_words, levels };
+        self.semi_global.winners(&pair, self.options.uniqueness, &mut self.winners);
     }
 
     fn correlate_areas(&mut self, left: &Image, right: &Image, levels: usize) {
         let scale = smoothing::grey_scale([left, right]);
         self.left_slopes.compute(left, scale, false);
         self.right_slopes.compute(right, scale, true);
-        let pair = area::Pair {
+        let pair = area::SlopePair {
             left: &self.left_slopes,
             right: &self.right_slopes,
             width: left.width(),
             height: left.height(),
             levels,
-            options: &self.options.area,
+            options: &self.options.expert,
         };
         self.sigma.resize(self.winners.len(), f32::NAN);
         self.area.winners(&pair, &mut self.winners, &mut self.sigma);
@@ -248,6 +237,7 @@ mod tests {
     use std::sync::atomic::Ordering;
 
     use super::*;
+    use crate::simd::PLAIN;
 
     /// A rough pair of textured steps, of odd size.
     fn pair(width: usize, height: usize, depth: f32) -> (Image, Image) {
@@ -267,26 +257,18 @@ mod tests {
             let planes = [map.shift.grid(), map.sigma.grid()];
             planes.iter().flat_map(|plane| plane.values().iter().map(|v| v.to_bits())).collect()
         };
-        let windows = [
-            CensusWindow::FiveByFive,
-            CensusWindow::SevenBySeven,
-            CensusWindow::NineBySeven,
-            CensusWindow::Symmetric,
-        ];
-        let semi_global = windows.map(|census| (Matcher::SemiGlobal, census));
-        let area = (Matcher::AreaCorrelation, CensusWindow::default());
-        for (matcher, census) in semi_global.into_iter().chain([area]) {
+        for matcher in [Matcher::SemiGlobal, Matcher::AreaCorrelation] {
             for (width, height, levels, depth) in
                 [(131, 37, 24, 255.0), (97, 21, 97, 65_535.0), (61, 33, 70, 1.0)]
             {
                 let (left, right) = pair(width, height, depth);
-                let options = DisparityOptions { matcher, census, levels, ..DisparityOptions::default() };
+                let options = DisparityOptions { matcher, levels, ..DisparityOptions::default() };
                 let wide = DisparityMatcher::new(options.clone()).compute(&left, &right).unwrap();
-                lanes::tests::PLAIN.store(true, Ordering::Relaxed);
+                PLAIN.store(true, Ordering::Relaxed);
                 let plain = DisparityMatcher::new(options).compute(&left, &right).unwrap();
-                lanes::tests::PLAIN.store(false, Ordering::Relaxed);
-                assert!(wide.shift.density() > 0.5, "{matcher:?} {census:?} {}", wide.shift.density());
-                assert_eq!(bits(&wide), bits(&plain), "{matcher:?} {census:?} {width} x {height}");
+                PLAIN.store(false, Ordering::Relaxed);
+                assert!(wide.shift.density() > 0.5, "{matcher:?} {}", wide.shift.density());
+                assert_eq!(bits(&wide), bits(&plain), "{matcher:?} {width} x {height}");
             }
         }
     }

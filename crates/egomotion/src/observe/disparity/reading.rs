@@ -3,17 +3,17 @@
 use super::DisparityMap;
 use crate::geometry::{Field, Grid};
 
-/// Half the side of the window that is looked at, in pixels.
+/// Half the side of the window that is looked at, in pixels: a larger one averages more noise and bends more.
 const RADIUS: usize = 2;
-/// A neighbour is of the same surface whose disparity differs by no more than this for each pixel of distance,
-/// beside noise: as steep as a surface can be that both cameras see.
-const STEEPEST: f64 = 1.0;
+/// A neighbour is of the same surface whose disparity differs by no more than this, in pixels, for each pixel of
+/// distance, beside noise: as steep as a surface can be that both cameras see.
+const STEEPEST_SURFACE: f64 = 1.0;
 /// Noise that still belongs to a surface, in standard deviations.
-const NOISE: f64 = 3.0;
+const SURFACE_NOISE_SIGMAS: f64 = 3.0;
 /// Fewest pixels that make a slope.
-const LEAST_FIT: usize = 6;
+const FEWEST_SLOPE_PIXELS: f64 = 6.0;
 /// Errors of neighbours are taken as one over so many pixels: depth is measured in windows.
-const CORRELATION_AREA: f64 = 9.0;
+const CORRELATION_AREA_PX: f64 = 9.0;
 
 /// What a map says at a place between its pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,14 +40,14 @@ impl DisparityMap {
         let (u0, v0) = (u.round() as usize, v.round() as usize);
         let centre = f64::from(self.shift.get(u0, v0)?);
         let sigma = f64::from(self.sigma.get(u0, v0)?);
-        let (mut plane, mut others, mut furthest) = (Plane::default(), 0.0, 0.0_f64);
+        let (mut plane, mut others, mut furthest) = (PlaneFit::default(), 0.0, 0.0_f64);
         for row in v0.saturating_sub(RADIUS)..(v0 + RADIUS + 1).min(height) {
             for column in u0.saturating_sub(RADIUS)..(u0 + RADIUS + 1).min(width) {
                 let Some(d) = self.shift.get(column, row) else { continue };
                 let (x, y) = (column as f64 - u, row as f64 - v);
                 let apart = f64::from(d) - centre;
                 let distance = (column.abs_diff(u0) as f64).hypot(row.abs_diff(v0) as f64);
-                if apart.abs() <= STEEPEST * distance + NOISE * sigma {
+                if apart.abs() <= STEEPEST_SURFACE * distance + SURFACE_NOISE_SIGMAS * sigma {
                     plane.add(x, y, apart);
                 } else {
                     others += 1.0;
@@ -57,16 +57,17 @@ impl DisparityMap {
         }
         let (value, slope, misfit) = plane.fit().unwrap_or((0.0, (0.0, 0.0), 0.0));
         let share = others / (others + plane.count);
-        let independent = (plane.count / CORRELATION_AREA).max(1.0);
+        let independent = (plane.count / CORRELATION_AREA_PX).max(1.0);
         // What the fit leaves beyond the noise is the surface's own shape.
         let shape = (misfit - sigma * sigma).max(0.0);
         let variance = sigma * sigma / independent + shape + share * furthest * furthest;
         Some(Reading { shift: centre + value, variance, slope })
     }
 
-    /// Given disparity with the standard deviation of each value, where it is no edge.
+    /// Disparity handed in by somebody else, as by a depth camera, with the standard deviation of each value where it
+    /// is no edge.
     ///
-    /// Depth edges of a given map seldom lie where the image has them: around one the standard deviation grows by
+    /// Depth edges of such a map seldom lie where the image has them: around one the standard deviation grows by
     /// half the jump.
     pub fn given(shift: Field, sigma_px: impl Fn(f32) -> f32) -> Self {
         let (width, height) = shift.size();
@@ -86,7 +87,7 @@ fn jump(shift: &Field, (u, v): (usize, usize), d: f32, sigma: f32) -> f32 {
     for row in v.saturating_sub(1)..(v + 2).min(height) {
         for there in &shift.row(row)[u.saturating_sub(1)..(u + 2).min(width)] {
             let step = (there - d).abs();
-            if step > STEEPEST as f32 + NOISE as f32 * sigma {
+            if step > STEEPEST_SURFACE as f32 + SURFACE_NOISE_SIGMAS as f32 * sigma {
                 largest = largest.max(step);
             }
         }
@@ -96,7 +97,7 @@ fn jump(shift: &Field, (u, v): (usize, usize), d: f32, sigma: f32) -> f32 {
 
 /// Sums for a plane z = a + b x + c y.
 #[derive(Debug, Clone, Copy, Default)]
-struct Plane {
+struct PlaneFit {
     count: f64,
     x: f64,
     y: f64,
@@ -109,7 +110,7 @@ struct Plane {
     zz: f64,
 }
 
-impl Plane {
+impl PlaneFit {
     fn add(&mut self, x: f64, y: f64, z: f64) {
         self.count += 1.0;
         self.x += x;
@@ -125,7 +126,7 @@ impl Plane {
 
     /// Value at the origin, slope, and mean squared residual; `None` of few points or of a line of them.
     fn fit(&self) -> Option<(f64, (f64, f64), f64)> {
-        if self.count < LEAST_FIT as f64 {
+        if self.count < FEWEST_SLOPE_PIXELS {
             return None;
         }
         let (mx, my, mz) = (self.x / self.count, self.y / self.count, self.z / self.count);

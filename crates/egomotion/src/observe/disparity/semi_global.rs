@@ -6,26 +6,38 @@
 //! volume is ever stored. (With the two diagonals from above, more than half of the sum would have
 //! come from above, and slanted ground would come out worse.)
 //!
-//! Everything fits into bytes: a cost has at most 31, a path at most 85, their sum at most 255.
+//! Everything fits into bytes: a cost has at most 24, a path at most 24 + 54 = 78, the sum of three at most 234.
 
 use rayon::prelude::*;
 
-use super::DisparityOptions;
-use super::census::Census;
-use super::check::{Claims, Winner, believe};
-use super::lanes::{LANES, widest};
-use super::sweep::{Back, Forth, blocks_for, with_blocks};
+use super::census::{COMPARISONS, Census};
+use super::sweep::{BackwardSweep, ForwardSweep, blocks_for, with_blocks};
+use super::winners::{Claims, Winner, believe};
 use crate::geometry::Image;
+use crate::simd::{LANES, widest};
 
 /// Rows answered by one strip. The strips are fixed, so the answer does not depend on the threads.
 const STRIP_ROWS: usize = 96;
 /// Rows above a strip from which its downward paths start.
 const WARM_UP_ROWS: usize = 8;
-/// Largest penalty for which the sum of three paths fits into 8 bits.
-const LARGEST_PENALTY: u8 = u8::MAX / 3 - super::census::LARGEST_COST;
+/// P1, the cost of a step of one level between neighbours, in bits of the census words' distance: larger smooths
+/// slanted surfaces into steps, smaller lets noise through.
+const SMALL_PENALTY: u8 = 10;
+/// P2, the cost of a jump between neighbours of equal grey level, in the same unit: larger closes gaps between
+/// thin objects, smaller breaks surfaces without texture.
+const LARGE_PENALTY: u8 = 54;
+/// The least that P2 becomes where the grey level jumps, in the same unit.
+const LEAST_LARGE_PENALTY: u8 = 24;
+/// Grey-level difference that halves P2, in units of the image's mean difference of neighbours.
+const EDGE_CONTRAST: f64 = 4.0;
+/// Levels by which the disparity found from the right image may differ.
+const LEFT_RIGHT_TOLERANCE: usize = 2;
+// The sum of three paths fits into 8 bits, and steps of one level are never dearer than jumps.
+const _: () = assert!(3 * (LARGE_PENALTY as usize + COMPARISONS) <= u8::MAX as usize);
+const _: () = assert!(SMALL_PENALTY <= LEAST_LARGE_PENALTY && LEAST_LARGE_PENALTY <= LARGE_PENALTY);
 
 /// The census words of a pair and what the sweeps need to know of it.
-pub(super) struct Pair<'a> {
+pub(super) struct CensusPair<'a> {
     /// Left image, grey levels.
     pub left: &'a Image,
     /// Census words of the left image.
@@ -39,55 +51,48 @@ pub(super) struct Pair<'a> {
 /// The work space of all strips.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SemiGlobal {
-    strips: Vec<Strip>,
+    strips: Vec<SweepStrip>,
 }
 
 impl SemiGlobal {
     /// The winning disparity of every pixel, to a fraction of a pixel, NaN where no winner is to be
     /// believed; row-major in `winners`.
-    pub(super) fn winners(&mut self, pair: &Pair<'_>, options: &DisparityOptions, winners: &mut [f32]) {
+    pub(super) fn winners(&mut self, pair: &CensusPair<'_>, uniqueness: f32, winners: &mut [f32]) {
         let width = pair.left.width();
-        let penalties = Penalties::new(pair.left, options);
-        self.strips.resize_with(pair.left.height().div_ceil(STRIP_ROWS), Strip::default);
+        let penalty = JumpPenalty::new(pair.left);
+        self.strips.resize_with(pair.left.height().div_ceil(STRIP_ROWS), SweepStrip::default);
         let chunks = winners.par_chunks_mut(STRIP_ROWS * width);
         self.strips.par_iter_mut().zip(chunks).enumerate().for_each(|(index, (strip, winners))| {
             let first = index * STRIP_ROWS;
             strip.start(width, pair.levels);
             for v in first.saturating_sub(WARM_UP_ROWS)..first {
-                strip.sweep_forth(pair, &penalties, v);
+                strip.sweep_forward(pair, &penalty, v);
             }
             for (v, winners) in (first..).zip(winners.chunks_mut(width)) {
-                strip.sweep_forth(pair, &penalties, v);
-                strip.sweep_back(pair.levels, &penalties, options, winners);
+                strip.sweep_forward(pair, &penalty, v);
+                strip.sweep_backward(pair.levels, uniqueness, winners);
             }
         });
     }
 }
 
-/// P1, and P2 as a function of the difference of two neighbouring grey levels.
-struct Penalties {
-    small: u8,
-    large: f32,
-    least: f32,
+/// P2 as a function of the difference of two neighbouring grey levels.
+struct JumpPenalty {
     /// One over the grey-level difference that halves P2.
     per_grey: f32,
 }
 
-impl Penalties {
-    fn new(image: &Image, options: &DisparityOptions) -> Self {
-        let small = options.penalty_small.min(LARGEST_PENALTY);
-        let large = options.penalty_large.clamp(small, LARGEST_PENALTY);
-        let least = options.penalty_large_least.clamp(small, large);
-        let contrast = mean_step(image) * f64::from(options.edge_contrast);
-        let per_grey = if contrast > 0.0 { contrast.recip() as f32 } else { 0.0 };
-        Self { small, large: large.into(), least: least.into(), per_grey }
+impl JumpPenalty {
+    fn new(image: &Image) -> Self {
+        let contrast = mean_step(image) * EDGE_CONTRAST;
+        Self { per_grey: if contrast > 0.0 { contrast.recip() as f32 } else { 0.0 } }
     }
 
     /// P2 between two neighbouring pixels: a jump of depth is likely where the grey level jumps.
     #[inline(always)]
-    fn large(&self, grey: f32, neighbour: f32) -> u8 {
-        let p2 = self.large / (1.0 + (grey - neighbour).abs() * self.per_grey);
-        p2.max(self.least) as u8
+    fn between(&self, grey: f32, neighbour: f32) -> u8 {
+        let p2 = f32::from(LARGE_PENALTY) / (1.0 + (grey - neighbour).abs() * self.per_grey);
+        p2.max(f32::from(LEAST_LARGE_PENALTY)) as u8
     }
 }
 
@@ -101,7 +106,7 @@ fn mean_step(image: &Image) -> f64 {
 
 /// One strip's work space: rows of costs, level by level for each pixel, `stride` levels to a pixel.
 #[derive(Debug, Clone, Default)]
-struct Strip {
+struct SweepStrip {
     stride: usize,
     matching: Vec<u8>,
     /// Costs of the path from above, less their minimum, between two margins: the row above until
@@ -117,7 +122,7 @@ struct Strip {
     best: Vec<Winner>,
 }
 
-impl Strip {
+impl SweepStrip {
     fn start(&mut self, width: usize, levels: usize) {
         self.stride = blocks_for(levels) * LANES;
         let size = width * self.stride;
@@ -130,13 +135,13 @@ impl Strip {
     }
 
     /// Matching costs of row `v`, and the paths from the left and from above.
-    fn sweep_forth(&mut self, pair: &Pair<'_>, penalties: &Penalties, v: usize) {
+    fn sweep_forward(&mut self, pair: &CensusPair<'_>, penalty: &JumpPenalty, v: usize) {
         let (here, above) = (pair.left.row(v), pair.left.row(v.saturating_sub(1)));
         for (p2, two) in self.p2_left[1..].iter_mut().zip(here.windows(2)) {
-            *p2 = penalties.large(two[1], two[0]);
+            *p2 = penalty.between(two[1], two[0]);
         }
         for ((p2, &grey), &above) in self.p2_above.iter_mut().zip(here).zip(above) {
-            *p2 = penalties.large(grey, above);
+            *p2 = penalty.between(grey, above);
         }
         let words = pair.right_words.row(v);
         self.right_row.clear();
@@ -145,14 +150,12 @@ impl Strip {
         with_blocks!(
             self.stride / LANES,
             BLOCKS,
-            widest(Forth::<BLOCKS> {
+            widest(ForwardSweep::<BLOCKS> {
                 left: pair.left_words.row(v),
                 right: &self.right_row,
                 plane: pair.right_words.stride,
-                planes: pair.right_words.planes,
-                halve: pair.right_words.halve,
                 levels: pair.levels,
-                p1: penalties.small,
+                p1: SMALL_PENALTY,
                 p2_left: &self.p2_left,
                 p2_above: &self.p2_above,
                 matching: &mut self.matching,
@@ -164,28 +167,22 @@ impl Strip {
 
     /// The path from the right, and the winners of the row: those that are unique and not a better
     /// match of another pixel.
-    fn sweep_back(
-        &mut self,
-        levels: usize,
-        penalties: &Penalties,
-        options: &DisparityOptions,
-        winners: &mut [f32],
-    ) {
+    fn sweep_backward(&mut self, levels: usize, uniqueness: f32, winners: &mut [f32]) {
         self.best.resize(winners.len(), Winner::default());
         with_blocks!(
             self.stride / LANES,
             BLOCKS,
-            widest(Back::<BLOCKS> {
+            widest(BackwardSweep::<BLOCKS> {
                 levels,
-                p1: penalties.small,
+                p1: SMALL_PENALTY,
                 p2_left: &self.p2_left,
                 matching: &self.matching,
                 sums: &self.sums,
-                uniqueness: options.uniqueness,
+                uniqueness,
                 best: &mut self.best,
             })
         );
         self.claims.of_winners(&self.best);
-        believe(&self.best, options.left_right_tolerance, &self.claims, winners);
+        believe(&self.best, LEFT_RIGHT_TOLERANCE, &self.claims, winners);
     }
 }

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::lanes::{Bytes, Kernel, LANES, widest};
 use crate::geometry::Image;
+use crate::simd::{Bytes, Kernel, LANES, widest};
 
 /// An image smoothed by the binomial (1, 2, 1)/4 both ways, in rows continued at either end.
 #[derive(Debug, Clone, Default)]
@@ -18,7 +18,7 @@ impl Smoothed {
     ///
     /// Rows begin `margin` pixels before the image and end as many or more after a multiple of
     /// `LANES`; there the nearest pixel stands.
-    pub fn compute(&mut self, image: &Image, margin: usize, scale: f32, mirrored: bool) {
+    pub(super) fn compute(&mut self, image: &Image, margin: usize, scale: f32, mirrored: bool) {
         let (width, height) = image.size();
         self.stride = width.next_multiple_of(LANES) + 2 * margin;
         self.values.resize(self.stride * height, 0);
@@ -33,7 +33,7 @@ impl Smoothed {
     }
 
     /// Row `v`, from `margin` pixels before the image on.
-    pub fn row(&self, v: usize) -> &[i16] {
+    pub(super) fn row(&self, v: usize) -> &[i16] {
         &self.values[v * self.stride..(v + 1) * self.stride]
     }
 }

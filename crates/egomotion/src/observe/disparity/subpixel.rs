@@ -9,40 +9,20 @@
 
 use rayon::prelude::*;
 
-use super::check::NO_LEVEL;
-use super::lanes::{Bytes, Kernel, widest};
-use super::lucas_kanade::{Differences, Fit, FitRow, row_length};
-use super::rows::{RowOffset, beside};
-use super::surface::{RADIUS, SurfaceMean};
+use super::compare::{CompareRow, RowOffset, rows_beside};
+use super::lucas_kanade::{CorrectionRow, DifferenceRow, Posterior, RADIUS, SolveWindows, row_length};
 use crate::geometry::{Image, upper_median};
 use crate::observe::spline;
+use crate::simd::{Bytes, Kernel, widest};
 
-/// Standard deviation of the semi-global disparity, in pixels.
-const PRIOR_SIGMA: f32 = 0.4;
-/// Standard deviation where the refinement contradicts the semi-global disparity, in pixels.
-const CONTRADICTED_SIGMA: f32 = 1.0;
-/// Correction of the semi-global disparity beyond which it counts as contradicted, in pixels.
-const CONTRADICTION: f32 = 1.0;
-/// What no image noise explains (interpolation), in pixels.
-const MODEL_SIGMA: f32 = 0.02;
-/// Variance, in squares of the last step, for the depth inside a window that no one step fits;
-/// measured on Middlebury pairs.
-const MISFIT_WEIGHT: f32 = 1.0;
-/// Growth of the variance that residuals do not show: neighbours are compared at disparities smoothed
-/// together, and err together. Measured on rendered, Middlebury and KITTI pairs alike.
-const SHARED_ERROR: f32 = 1.4;
-/// Growth of the standard deviation where the window is not all of one surface, beside edges and
-/// holes; measured on Middlebury and KITTI pairs.
-const STRAY_WEIGHT: f32 = 4.0;
-
-/// Offset of the minimum of the parabola through three neighbouring costs, −½ … ½; 0 beside the
-/// end of the levels and where there is no minimum.
-pub(super) fn parabola(costs: [u16; 3]) -> f32 {
-    let [before, here, after] = costs.map(f32::from);
-    let curvature = before - 2.0 * here + after;
-    let beside_end = costs[0].max(costs[2]) == NO_LEVEL;
-    if curvature > 0.0 && !beside_end { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
-}
+/// Gauss–Newton steps: each compares the images at what the one before found, so more cost time.
+const STEPS: usize = 2;
+/// Every so many pixels are sampled for the median of the noise over the image: a prime number, so that the samples
+/// do not fall into the same columns of every row.
+const NOISE_SAMPLING_PX: usize = 61;
+/// Disparity difference up to which a pixel of the window is of the same surface, in pixels: at the centre, and
+/// per pixel of distance from it.
+const SAME_SURFACE_PX: (f32, f32) = (0.5, 0.25);
 
 /// The planes of the refinement, with a margin of at least RADIUS.0 pixels at either end of a row.
 #[derive(Debug, Clone, Default)]
@@ -66,9 +46,6 @@ pub(super) struct Refinement {
     noise: Vec<f32>,
 }
 
-/// Every how many pixels the median over an image is taken of.
-const SAMPLING: usize = 61;
-
 /// The median of the values that are numbers.
 fn median(values: impl Iterator<Item = f32>) -> Option<f32> {
     let mut sample: Vec<f32> = values.filter(|n| !n.is_nan()).collect();
@@ -83,22 +60,22 @@ fn window_rows(plane: &[f32], stride: usize, v: usize) -> impl Iterator<Item = &
 }
 
 impl Refinement {
-    /// Refine `coarse` (row-major, NaN is missing) by `steps` steps.
-    pub(super) fn refine(&mut self, left: &Image, right: &Image, coarse: &[f32], steps: usize) {
+    /// Refine `coarse` (row-major, NaN is missing).
+    pub(super) fn refine(&mut self, left: &Image, right: &Image, coarse: &[f32]) {
         self.start(left.width(), left.height());
         let right = spline::row_coefficients(right);
         let stride = self.stride();
         let rows = self.refined.par_chunks_mut(stride).zip(coarse.par_chunks(self.width));
         rows.for_each(|(row, coarse)| row[RADIUS.0..][..coarse.len()].copy_from_slice(coarse));
         let mut offset = RowOffset::default();
-        for step in 0..steps {
+        for step in 0..STEPS {
             self.smooth();
             if step == 0 {
                 // All later steps start from here; what they compare at is written anew.
                 std::mem::swap(&mut self.prior, &mut self.disparity);
             }
             self.compare(left, &right, step == 0, offset);
-            if step == 0 && steps > 1 {
+            if step == 0 {
                 offset = self.row_offset(left);
             }
             let typical_noise = self.typical_noise();
@@ -177,8 +154,8 @@ impl Refinement {
             .zip(self.difference.par_chunks_mut(stride));
         planes.enumerate().for_each(|(v, (((disparity, weight), slope), difference))| {
             let inner = RADIUS.0..RADIUS.0 + width;
-            let (above, below) = beside(left, v);
-            widest(Compare {
+            let (above, below) = rows_beside(left, v);
+            widest(CompareRow {
                 left: left.row(v),
                 above,
                 below,
@@ -201,7 +178,7 @@ impl Refinement {
 
     /// Median over the image of the noise variance of the last step; `None` before the first.
     fn typical_noise(&self) -> Option<f32> {
-        median(self.noise.iter().copied().step_by(SAMPLING))
+        median(self.noise.iter().copied().step_by(NOISE_SAMPLING_PX))
     }
 
     /// Solve for the disparity of every window.
@@ -216,12 +193,12 @@ impl Refinement {
                 let planes = window_rows(weight, stride, v)
                     .zip(window_rows(slope, stride, v))
                     .zip(window_rows(difference, stride, v));
-                let rows: Vec<Differences<'_>> = planes
-                    .map(|((weight, slope), difference)| Differences { weight, slope, difference })
+                let rows: Vec<DifferenceRow<'_>> = planes
+                    .map(|((weight, slope), difference)| DifferenceRow { weight, slope, difference })
                     .collect();
                 let inner = RADIUS.0..RADIUS.0 + width;
-                let fit = Fit { pull, information, noise: &mut noise[inner.clone()] };
-                widest(FitRow { rows: &rows, typical_noise, fit });
+                let correction = CorrectionRow { pull, information, noise: &mut noise[inner.clone()] };
+                widest(SolveWindows { rows: &rows, typical_noise, correction });
                 let row = v * stride + RADIUS.0..v * stride + RADIUS.0 + width;
                 widest(Posterior {
                     prior: &prior[row.clone()],
@@ -237,190 +214,42 @@ impl Refinement {
     }
 }
 
-/// A row of the left image against the right one, each pixel at its disparity.
-struct Compare<'a> {
-    left: &'a [f32],
-    /// The left image's rows above and below.
-    above: &'a [f32],
-    below: &'a [f32],
-    /// Right row minus left row at the first pixel, and its growth from pixel to pixel.
-    row_offset: (f32, f32),
-    /// Spline coefficients.
-    right: &'a [f32],
-    disparity: &'a [f32],
-    weight: &'a mut [f32],
-    slope: &'a mut [f32],
-    difference: &'a mut [f32],
+/// The mean over the pixels `lines[k][i]`, k = 0 …, that are of the surface of `centre[i]`.
+///
+/// Missing where the centre is (NaN); pixels that are missing do not count.
+struct SurfaceMean<'a, const N: usize> {
+    /// The middle one may be the centre's own line.
+    lines: [&'a [f32]; N],
+    centre: &'a [f32],
+    mean: &'a mut [f32],
+    /// Share of the pixels that are of the surface, 0 … 1: times what it was, unless `first`.
+    support: &'a mut [f32],
+    first: bool,
 }
 
-impl Kernel for Compare<'_> {
+impl<const N: usize> Kernel for SurfaceMean<'_, N> {
     type Output = ();
     #[inline(always)]
     fn run<B: Bytes>(self) {
-        let Self { left, above, below, row_offset, right, disparity, weight, slope, difference } = self;
-        let width = left.len();
-        if width < 4 {
-            [weight, slope, difference].into_iter().for_each(|line| line.fill(0.0));
-            return;
+        let n = self.mean.len();
+        let lines = self.lines.map(|line| &line[..n]);
+        let centre = &self.centre[..n];
+        let support = &mut self.support[..n];
+        if self.first {
+            support.fill(1.0);
         }
-        for first in (0..width).step_by(TILE) {
-            let here = first..(first + TILE).min(width);
-            let mut tile = Tile::new(first, left, &disparity[here.clone()]);
-            tile.split(width);
-            for (i, &from) in tile.from.iter().enumerate() {
-                let Some(taps) = right.get(from as usize..from as usize + 4) else { continue };
-                for (line, &tap) in tile.taps.iter_mut().zip(taps) {
-                    line[i] = tap;
-                }
-            }
-            let mut lines = tile.compare(width);
-            let mut down = [0.0; TILE];
-            for (down, (above, below)) in
-                down.iter_mut().zip(above[here.clone()].iter().zip(&below[here.clone()]))
-            {
-                *down = 0.5 * (below - above);
-            }
-            // What is seen of another row: it has no part in disparity.
-            let [weight_here, _, difference_here] = &mut lines;
-            for i in 0..TILE {
-                let rows = row_offset.0 + row_offset.1 * (first + i) as f32;
-                difference_here[i] -= weight_here[i] * rows * down[i];
-            }
-            let outputs = [&mut weight[here.clone()], &mut slope[here.clone()], &mut difference[here]];
-            for (output, line) in outputs.into_iter().zip(&lines) {
-                output.copy_from_slice(&line[..output.len()]);
-            }
-        }
-        // The first and the last pixel have no slope.
-        for u in [0, width - 1] {
-            (weight[u], slope[u], difference[u]) = (0.0, 0.0, 0.0);
-        }
-    }
-}
-
-/// Pixels compared at a time.
-const TILE: usize = 64;
-
-/// Some pixels of the left row, and what the right row has for them.
-struct Tile {
-    /// Grey levels from one pixel before the first to one after the last.
-    left: [f32; TILE + 2],
-    /// Where in the right row each pixel is looked for.
-    at: [f32; TILE],
-    /// The first of the four coefficients around, and how far `at` is beyond the second.
-    from: [u32; TILE],
-    fraction: [f32; TILE],
-    taps: [[f32; TILE]; 4],
-}
-
-impl Tile {
-    #[inline(always)]
-    fn new(first: usize, left: &[f32], disparity: &[f32]) -> Self {
-        let mut tile = Self {
-            left: [0.0; TILE + 2],
-            at: [f32::NAN; TILE],
-            from: [0; TILE],
-            fraction: [0.0; TILE],
-            taps: [[0.0; TILE]; 4],
-        };
-        let start = first.saturating_sub(1);
-        let grey = &left[start..(first + TILE + 1).min(left.len())];
-        let offset = start + 1 - first;
-        tile.left[offset..offset + grey.len()].copy_from_slice(grey);
-        for (i, (at, d)) in tile.at.iter_mut().zip(disparity).enumerate() {
-            *at = (first + i) as f32 - d;
-        }
-        tile
-    }
-
-    /// Whole pixel and fraction of each place inside; anything elsewhere.
-    #[inline(always)]
-    fn split(&mut self, width: usize) {
-        // Added to less than 2²³ this leaves the whole number in the last bits: a few operations on
-        // vectors, where a checked conversion takes many.
-        const LAST_BIT_IS_ONE: f32 = 8_388_608.0;
-        let last = width as f32 - 3.0;
-        for i in 0..TILE {
-            let at = self.at[i];
-            let inside = if at >= 1.0 { at } else { 1.0 };
-            let inside = if inside <= last { inside } else { last };
-            let whole = inside - 0.5 + LAST_BIT_IS_ONE;
-            self.from[i] = (whole.to_bits() & 0x7f_ffff).saturating_sub(1);
-            self.fraction[i] = inside - (whole - LAST_BIT_IS_ONE);
-        }
-    }
-
-    /// Weight, slope and difference of each pixel.
-    #[inline(always)]
-    fn compare(&self, width: usize) -> [[f32; TILE]; 3] {
-        let mut lines = [[0.0; TILE]; 3];
-        let [weight, slope, difference] = &mut lines;
-        let [a, b, c, d] = &self.taps;
-        let end = width as f32 - 2.0;
-        for i in 0..TILE {
-            let at = self.at[i];
-            // Of NaN this is false.
-            let inside = at >= 1.0 && at < end;
-            let w = spline::weights(self.fraction[i]);
-            let grey = w[0] * a[i] + w[1] * b[i] + w[2] * c[i] + w[3] * d[i];
-            weight[i] = if inside { 1.0 } else { 0.0 };
-            // The right image's own slope would carry the noise of the grey level read there, and
-            // pull every answer towards half pixels.
-            slope[i] = if inside { 0.5 * (self.left[i + 2] - self.left[i]) } else { 0.0 };
-            difference[i] = if inside { self.left[i + 1] - grey } else { 0.0 };
-        }
-        lines
-    }
-}
-
-/// Disparity and its standard deviation from the semi-global disparity and what the grey levels say
-/// at `compared`; NaN where there is no semi-global disparity.
-struct Posterior<'a> {
-    prior: &'a [f32],
-    compared: &'a [f32],
-    /// Share of the window that is of the pixel's surface.
-    support: &'a [f32],
-    pull: &'a [f32],
-    information: &'a [f32],
-    refined: &'a mut [f32],
-    sigma: &'a mut [f32],
-}
-
-impl Kernel for Posterior<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<B: Bytes>(self) {
-        let n = self.refined.len();
-        let (prior, compared) = (&self.prior[..n], &self.compared[..n]);
-        let (pull, information, support) = (&self.pull[..n], &self.information[..n], &self.support[..n]);
-        let (refined, sigma) = (&mut self.refined[..n], &mut self.sigma[..n]);
-        let prior_information = PRIOR_SIGMA.powi(-2);
         for i in 0..n {
-            let information = information[i] + prior_information;
-            let value = compared[i] + (pull[i] + prior_information * (prior[i] - compared[i])) / information;
-            // A surface on which the window's pixels do not agree still moves in the last step.
-            let misfit = MISFIT_WEIGHT * (value - compared[i]) * (value - compared[i]);
-            let spread = (SHARED_ERROR / information + misfit + MODEL_SIGMA * MODEL_SIGMA).sqrt();
-            let contradicts = (value - prior[i]).abs() > CONTRADICTION;
-            let (value, spread) = if contradicts { (prior[i], CONTRADICTED_SIGMA) } else { (value, spread) };
-            let strays = 1.0 + STRAY_WEIGHT * (1.0 - support[i]);
-            // Where no window can be compared the semi-global disparity remains.
-            let known = information.abs() < f32::INFINITY && !value.is_nan();
-            let unknown = if prior[i].is_nan() { f32::NAN } else { PRIOR_SIGMA };
-            refined[i] = if known { value } else { prior[i] };
-            sigma[i] = strays * if known { spread } else { unknown };
+            let (mut count, mut sum) = (0.0, 0.0);
+            for (k, line) in lines.iter().enumerate() {
+                let change = line[i] - centre[i];
+                let tolerance = SAME_SURFACE_PX.0 + SAME_SURFACE_PX.1 * k.abs_diff(N / 2) as f32;
+                // A mask instead of a choice: it vectorises, and is safe where the change is NaN.
+                let same = if change.abs() <= tolerance { u32::MAX } else { 0 };
+                count += f32::from_bits(same & 1.0_f32.to_bits());
+                sum += f32::from_bits(same & change.to_bits());
+            }
+            self.mean[i] = centre[i] + sum / count;
+            support[i] *= count / N as f32;
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_parabola_finds_its_minimum() {
-        let costs = [1.0, 0.0, -1.0].map(|d: f64| (1000.0 * (d + 0.3).powi(2)) as u16);
-        assert!((parabola(costs) - 0.3).abs() < 1e-3);
-        assert_eq!((parabola([7, 7, 7]), parabola([NO_LEVEL, 3, 9])), (0.0, 0.0));
     }
 }

@@ -4,14 +4,16 @@
 //! L(d) = C(d) + min(l(d), l(d∓1) + P1, P2) with l = L − min L of the pixel before. L itself is
 //! summed.
 
-use super::check::{NO_LEVEL, Winner};
-use super::lanes::{Bytes, Kernel, LANES};
+use super::census::PLANES;
+use super::winners::{NO_LEVEL, Winner};
+use crate::simd::{Bytes, Kernel, LANES};
 
 /// Cost beyond the ends of the levels: no path enters from there.
 const WALL: u8 = u8::MAX;
-/// A wall in the first and in the last byte.
-const FIRST: [u8; LANES] = wall_at(0);
-const LAST: [u8; LANES] = wall_at(LANES - 1);
+/// A wall in the first byte alone, for the level before the first.
+const FIRST_WALL: [u8; LANES] = wall_at(0);
+/// A wall in the last byte alone, for the level after the last.
+const LAST_WALL: [u8; LANES] = wall_at(LANES - 1);
 
 const fn wall_at(lane: usize) -> [u8; LANES] {
     let mut bytes = [0; LANES];
@@ -42,9 +44,9 @@ pub(super) fn blocks_for(levels: usize) -> usize {
 
 /// A path along the row: its costs at the last pixel less their minimum, in registers.
 #[derive(Clone, Copy)]
-struct Along<B, const BLOCKS: usize>([B; BLOCKS]);
+struct RowPath<B, const BLOCKS: usize>([B; BLOCKS]);
 
-impl<B: Bytes, const BLOCKS: usize> Along<B, BLOCKS> {
+impl<B: Bytes, const BLOCKS: usize> RowPath<B, BLOCKS> {
     #[inline(always)]
     fn start() -> Self {
         Self([B::splat(0); BLOCKS])
@@ -62,15 +64,12 @@ impl<B: Bytes, const BLOCKS: usize> Along<B, BLOCKS> {
 }
 
 /// From the left and from above: matching costs, and the sums of two paths.
-pub(super) struct Forth<'a, const BLOCKS: usize> {
+pub(super) struct ForwardSweep<'a, const BLOCKS: usize> {
     /// Census words of the row, plane by plane of `plane` bytes; of the right image mirrored, so that
     /// the candidates of rising disparity stand side by side.
     pub left: &'a [u8],
     pub right: &'a [u8],
     pub plane: usize,
-    pub planes: usize,
-    /// Whether a cost is half of the words' distance.
-    pub halve: bool,
     pub levels: usize,
     pub p1: u8,
     /// P2 between each pixel and the one left of it, and the one above.
@@ -81,14 +80,14 @@ pub(super) struct Forth<'a, const BLOCKS: usize> {
     pub sums: &'a mut [u8],
 }
 
-impl<const BLOCKS: usize> Forth<'_, BLOCKS> {
+impl<const BLOCKS: usize> ForwardSweep<'_, BLOCKS> {
     /// Matching costs of pixel `u`.
     ///
     /// A match outside the right image is neither confirmed nor refuted: it costs as much as the
     /// mean one inside. Were it as cheap as the best, the smoothness of these equal costs would win
     /// wherever the window of disparities sticks out.
     #[inline(always)]
-    fn match_pixel<B: Bytes, const PLANES: usize>(&mut self, u: usize) {
+    fn match_pixel<B: Bytes>(&mut self, u: usize) {
         let costs = &mut self.matching[u * BLOCKS * LANES..(u + 1) * BLOCKS * LANES];
         let first = self.p2_left.len() - 1 - u;
         let mut words = [B::splat(0); PLANES];
@@ -100,7 +99,6 @@ impl<const BLOCKS: usize> Forth<'_, BLOCKS> {
             for (k, word) in words.iter().enumerate() {
                 sum = sum.plus(word.distance(B::load(self.right, k * self.plane + first + block * LANES)));
             }
-            let sum = if self.halve { sum.halved() } else { sum };
             sum.store(costs, block * LANES);
         }
         let inside = self.levels.min(u + 1);
@@ -112,14 +110,17 @@ impl<const BLOCKS: usize> Forth<'_, BLOCKS> {
             costs[self.levels..].fill(WALL);
         }
     }
+}
 
+impl<const BLOCKS: usize> Kernel for ForwardSweep<'_, BLOCKS> {
+    type Output = ();
     #[inline(always)]
-    fn sweep<B: Bytes, const PLANES: usize>(mut self) {
+    fn run<B: Bytes>(mut self) {
         let stride = BLOCKS * LANES;
         let p1 = B::splat(self.p1);
-        let mut rightward = Along::<B, BLOCKS>::start();
+        let mut rightward = RowPath::<B, BLOCKS>::start();
         for u in 0..self.p2_left.len() {
-            self.match_pixel::<B, PLANES>(u);
+            self.match_pixel::<B>(u);
             let (p2_left, p2_above) = (B::splat(self.p2_left[u]), B::splat(self.p2_above[u]));
             let above = &mut self.downward[u * stride..(u + 1) * stride + 2 * LANES];
             let matching = &self.matching[u * stride..(u + 1) * stride];
@@ -133,10 +134,10 @@ impl<const BLOCKS: usize> Forth<'_, BLOCKS> {
                 let mut below = B::load(above, at - 1);
                 let mut over = B::load(above, at + 1);
                 if block == 0 {
-                    below = below.max(B::from_array(FIRST));
+                    below = below.max(B::from_array(FIRST_WALL));
                 }
                 if block + 1 == BLOCKS {
-                    over = over.max(B::from_array(LAST));
+                    over = over.max(B::from_array(LAST_WALL));
                 }
                 down[block] = below.min(over).plus(p1).min(same).min(p2_above).plus(cost);
                 along[block] = rightward.hand_on(block, p1, p2_left).plus(cost);
@@ -153,21 +154,8 @@ impl<const BLOCKS: usize> Forth<'_, BLOCKS> {
     }
 }
 
-impl<const BLOCKS: usize> Kernel for Forth<'_, BLOCKS> {
-    type Output = ();
-    #[inline(always)]
-    fn run<B: Bytes>(self) {
-        match self.planes {
-            3 => self.sweep::<B, 3>(),
-            6 => self.sweep::<B, 6>(),
-            4 => self.sweep::<B, 4>(),
-            _ => self.sweep::<B, 8>(),
-        }
-    }
-}
-
 /// From the right: the last path, and the winners.
-pub(super) struct Back<'a, const BLOCKS: usize> {
+pub(super) struct BackwardSweep<'a, const BLOCKS: usize> {
     pub levels: usize,
     pub p1: u8,
     pub p2_left: &'a [u8],
@@ -177,13 +165,13 @@ pub(super) struct Back<'a, const BLOCKS: usize> {
     pub best: &'a mut [Winner],
 }
 
-impl<const BLOCKS: usize> Kernel for Back<'_, BLOCKS> {
+impl<const BLOCKS: usize> Kernel for BackwardSweep<'_, BLOCKS> {
     type Output = ();
     #[inline(always)]
     fn run<B: Bytes>(self) {
         let stride = BLOCKS * LANES;
         let p1 = B::splat(self.p1);
-        let mut leftward = Along::<B, BLOCKS>::start();
+        let mut leftward = RowPath::<B, BLOCKS>::start();
         let mut total = [[0_u8; LANES]; BLOCKS];
         let width = self.best.len();
         // Up to which cost another level is a rival of the winner.
@@ -207,7 +195,7 @@ impl<const BLOCKS: usize> Kernel for Back<'_, BLOCKS> {
                 least = least.min(totals[block]);
             }
             let least_along = least_along.least();
-            leftward = Along(along.map(|cost| cost.minus(least_along)));
+            leftward = RowPath(along.map(|cost| cost.minus(least_along)));
             let least = least.least();
             let least_cost = least.to_array()[0];
             let rival = rivals_of[usize::from(least_cost)];

@@ -4,19 +4,19 @@ use crate::geometry::Image;
 use crate::observe::spline;
 use crate::simd::vectorised;
 
-/// Pixels handled at a time.
+/// Pixels handled at a time: what they need stays in the fastest cache.
 pub(super) const TILE: usize = 64;
 
 /// The images of one level: the first one's grey levels, the second one's spline coefficients.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Images<'a> {
+pub(super) struct LevelImages<'a> {
     pub from: &'a Image,
     pub to: &'a Image,
 }
 
-/// A row of differences, with a margin of zeros at either end that windows may reach into.
+/// A row of both images compared, with a margin of zeros at either end that windows may reach into.
 #[derive(Debug, Clone)]
-pub(super) struct Differences {
+pub(super) struct ComparedRow {
     /// 1 where the second image shows the pixel, else 0, as everything that follows.
     pub known: Vec<f32>,
     /// ∂I/∂u and ∂I/∂v of the first image, in grey levels per pixel.
@@ -29,16 +29,16 @@ pub(super) struct Differences {
     pub v: Vec<f32>,
 }
 
-impl Differences {
+impl ComparedRow {
     /// Zeros, for rows of `width` pixels and windows of the radius.
-    pub fn new(width: usize, radius: usize) -> Self {
+    pub(super) fn new(width: usize, radius: usize) -> Self {
         let row = || vec![0.0; width.next_multiple_of(TILE) + 2 * radius + TILE];
         let plain = || vec![0.0; width.next_multiple_of(TILE)];
         Self { known: row(), slope_u: row(), slope_v: row(), difference: row(), u: plain(), v: plain() }
     }
 
     /// Compare row `y` at the displacements `u`, `v`; the margin before the first pixel is `radius`.
-    pub fn compare(&mut self, images: Images<'_>, y: usize, radius: usize) {
+    pub(super) fn compare(&mut self, images: LevelImages<'_>, y: usize, radius: usize) {
         let (width, height) = images.from.size();
         let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| images.from.row(y));
         let inner = radius..radius + width;
@@ -73,7 +73,7 @@ slopes(rows: [&[f32]; 3], du: &mut [f32], dv: &mut [f32]) {
 }
 
 vectorised! {
-/// Differences of a row; slopes become 0 where the second image has no counterpart.
+/// ComparedRow of a row; slopes become 0 where the second image has no counterpart.
 differences(grey: &[f32], to: &Image, y: usize, at: (&[f32], &[f32]), out: [&mut [f32]; 4]) {
     let (width, height) = to.size();
     let [known, du, dv, difference] = out;
@@ -140,11 +140,11 @@ mod tests {
         let (from, to) = (image(1), spline::coefficients(&image(2)));
         let slopes = gradients(&from);
         for y in [0, 7, 19] {
-            let mut row = Differences::new(90, 4);
+            let mut row = ComparedRow::new(90, 4);
             for x in 0..90 {
                 (row.u[x], row.v[x]) = (0.3 * x as f32 - 11.0, 0.07 * x as f32 - 2.6);
             }
-            row.compare(Images { from: &from, to: &to }, y, 4);
+            row.compare(LevelImages { from: &from, to: &to }, y, 4);
             assert!(row.known[..4].iter().chain(&row.known[94..]).all(|&k| k == 0.0));
             let mut compared = 0;
             for x in 0..90 {

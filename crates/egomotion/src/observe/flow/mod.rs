@@ -1,36 +1,31 @@
 //! Dense optical flow with its covariance.
 //!
 //! Freely (`free`): coarse to fine by dense inverse search (`search`: small patches, inverse-compositional,
-//! after Kroeger et al., ECCV 2016, made dense by photometric weights in `densify`), then a windowed
+//! after Kroeger et al., ECCV 2016, made dense by photometric weights), then a windowed
 //! Lucas–Kanade step per pixel (`refine`, `solve`) which gives the sub-pixel accuracy and the covariance: at
 //! the level where the search ends, and at full resolution; where the latter has not enough texture the
-//! former's wider window answers (`widen`). What backward flow contradicts (`consistency`) stays missing.
+//! former's wider window answers. What backward flow contradicts stays missing. `step_planes` holds what a step
+//! gives, by name.
 //!
 //! With a prediction (`guided`, `rigid`) the Lucas–Kanade steps begin with it, and only what contradicts
 //! it is searched for freely.
 
-mod claims;
 mod compare;
-mod consistency;
-mod densify;
+mod corrections;
+mod displacement;
 mod free;
 mod guided;
-mod measured;
 mod options;
 mod refine;
 mod rigid;
-mod sampling;
 mod search;
-mod smooth;
 mod solve;
-mod variance_factor;
-mod widen;
+mod step_planes;
 
 pub use options::FlowOptions;
 pub use rigid::{Side, rigid_flow};
 
 use crate::geometry::{Field, Gaussian, Grid, Image};
-use crate::observe::planes::Planes;
 use crate::observe::pyramid::Pyramid;
 use crate::observe::spline;
 use nalgebra::{Matrix2, Vector2};
@@ -75,7 +70,7 @@ impl FlowField {
         Self { u, v, cov_uu: zero.clone(), cov_uv: zero.clone(), cov_vv: zero }
     }
 
-    /// Flow that somebody else has measured, with one standard deviation for all; missing where either component is.
+    /// Flow handed in by somebody else, with one standard deviation for all; missing where either component is.
     pub fn given(u: Field, v: Field, sigma_px: f32) -> Self {
         let (width, height) = u.size();
         let known = |x: usize, y: usize| u.get(x, y).and(v.get(x, y)).is_some();
@@ -92,11 +87,6 @@ impl FlowField {
     /// (width, height), in pixels.
     pub fn size(&self) -> (usize, usize) {
         self.u.size()
-    }
-
-    fn from_planes(planes: Planes<5>) -> Self {
-        let [u, v, cov_uu, cov_uv, cov_vv] = planes.into_grids();
-        Self { u: Field::from_grid(u), v: Field::from_grid(v), cov_uu, cov_uv, cov_vv }
     }
 
     /// Displacement measured at pixel (u, v), which must lie inside, with its covariance, in pixels; guesses
@@ -129,13 +119,6 @@ pub enum FlowError {
     Option(&'static str),
 }
 
-/// Dense displacement of every pixel without holes; what the steps hand on to each other.
-#[derive(Debug, Clone)]
-struct Displacement {
-    u: Grid<f32>,
-    v: Grid<f32>,
-}
-
 /// Flow of `from` to `to`, on the pixel grid of `from`, displacement (to − from) in pixels.
 ///
 /// `initial` predicts the flow at some or all pixels, as [`rigid_flow`] does from disparity and motion. The
@@ -161,9 +144,10 @@ pub fn dense_flow(
 /// Work space that flow keeps from one pair to the next; its content does not change the answer.
 #[derive(Debug, Clone, Default)]
 pub struct FlowSpace {
-    coarse: guided::Coarse,
-    found: guided::Coarse,
-    again: guided::Coarse,
+    /// The step from the prediction, the step from what the search found, and the step from both.
+    from_prediction: step_planes::StepPlanes,
+    from_search: step_planes::StepPlanes,
+    from_both: step_planes::StepPlanes,
 }
 
 /// Two images between which there is flow.
@@ -210,7 +194,7 @@ impl FlowPair<'_> {
                 &coefficients
             }
         };
-        let images = compare::Images { from, to };
+        let images = compare::LevelImages { from, to };
         Ok(match initial {
             Some(prediction) => guided::flow(self, images, prediction, options, space),
             None => free::flow(self, images, options),

@@ -5,14 +5,18 @@
 //! and d but for one division.
 
 use super::FlowField;
+use super::step_planes::{FlowPlanes, FlowRows};
 use crate::geometry::{RigidMotion, StereoRig, Twist};
 use crate::observe::disparity::{DisparityMap, GUESS_SIGMA_PX};
-use crate::observe::planes::Planes;
 use crate::simd::vectorised;
 use rayon::prelude::*;
 
 /// Standard deviation of the prediction for what disparity does not tell (the motion's own error), in pixels.
 const MOTION_SIGMA_PX: f32 = 0.1;
+/// Growth of a bridged disparity's standard deviation with the difference of the ends of its gap: it holds either end.
+const BRIDGE_SIGMA_PER_STEP: f32 = 0.3;
+/// Rows handled by one task: more make the work of tasks uneven, fewer cost time to start them.
+const STRIP_ROWS: usize = 16;
 
 /// Which camera's flow is predicted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,12 +36,12 @@ pub fn rigid_flow(disparity: &DisparityMap, rig: &StereoRig, phi: &Twist, side: 
     let (width, height) = disparity.shift.size();
     let motion = phi.exp();
     let rows = nearest_rows(disparity);
-    let mut planes = Planes::<5>::filled(width, height, f32::NAN);
-    planes.strips(ROWS).into_par_iter().enumerate().for_each_init(
+    let mut planes = FlowPlanes::filled(width, height, f32::NAN);
+    planes.strips(STRIP_ROWS).into_par_iter().enumerate().for_each_init(
         || (vec![0.0_f32; width], vec![0.0_f32; width]),
         |(shift, sigma), (strip, mut out)| {
-            for k in 0..out[0].len() / width.max(1) {
-                let v = strip * ROWS + k;
+            for k in 0..out.u.len() / width.max(1) {
+                let v = strip * STRIP_ROWS + k;
                 let Some(&Some(source)) = rows.get(v) else { continue };
                 let (from_shift, from_sigma) = (disparity.shift.row(source), disparity.sigma.row(source));
                 match side {
@@ -48,16 +52,12 @@ pub fn rigid_flow(disparity: &DisparityMap, rig: &StereoRig, phi: &Twist, side: 
                     Side::Right => seen_from_right(from_shift, from_sigma, shift, sigma),
                 }
                 bridge(shift, sigma, side);
-                let terms = Terms::new(rig, &motion, v, side);
-                predict(&terms, shift, sigma, out.each_mut().map(|p| &mut p[k * width..(k + 1) * width]));
+                predict(&RowTerms::new(rig, &motion, v, side), shift, sigma, out.row(k, width));
             }
         },
     );
-    FlowField::from_planes(planes)
+    planes.into_field()
 }
-
-/// Rows handled by one task; fixed.
-const ROWS: usize = 16;
 
 /// For each row the nearest one that has any disparity.
 fn nearest_rows(disparity: &DisparityMap) -> Vec<Option<usize>> {
@@ -108,7 +108,7 @@ fn bridge(shift: &mut [f32], sigma: &mut [f32], side: Side) {
             let step = (b - a) / (gap.len() + 1) as f32;
             for (k, u) in gap.enumerate() {
                 shift[u] = a + step * (k + 1) as f32;
-                sigma[u] = GUESS_SIGMA_PX + 0.3 * (b - a).abs();
+                sigma[u] = GUESS_SIGMA_PX + BRIDGE_SIGMA_PER_STEP * (b - a).abs();
             }
         }
         last = Some(u);
@@ -116,7 +116,7 @@ fn bridge(shift: &mut [f32], sigma: &mut [f32], side: Side) {
 }
 
 /// What is the same along a row.
-struct Terms {
+struct RowTerms {
     /// x of the first pixel, and f.
     x: f32,
     focal: f32,
@@ -131,7 +131,7 @@ struct Terms {
     right: f32,
 }
 
-impl Terms {
+impl RowTerms {
     fn new(rig: &StereoRig, motion: &RigidMotion, v: usize, side: Side) -> Self {
         let (x, y) = rig.image_from_pixel(0.0, v as f64);
         let r = &motion.rotation;
@@ -150,12 +150,14 @@ impl Terms {
 }
 
 vectorised! {
-/// Flow and covariance (u, v, uu, uv, vv) of a row.
-predict(terms: &Terms, shift: &[f32], sigma: &[f32], out: [&mut [f32]; 5]) {
+/// Flow and covariance of a row.
+predict(terms: &RowTerms, shift: &[f32], sigma: &[f32], out: FlowRows<'_>) {
     let n = shift.len();
     let sigma = &sigma[..n];
-    let [u, v, uu, uv, vv] = out.map(|row| &mut row[..n]);
-    let Terms { focal, q, by_x, by_d, right, .. } = *terms;
+    let FlowRows { u, v, uu, uv, vv } = out;
+    let (u, v) = (&mut u[..n], &mut v[..n]);
+    let (uu, uv, vv) = (&mut uu[..n], &mut uv[..n], &mut vv[..n]);
+    let RowTerms { focal, q, by_x, by_d, right, .. } = *terms;
     for i in 0..n {
         let d = shift[i] + terms.doffs;
         let d = if d < 0.0 { 0.0 } else { d };

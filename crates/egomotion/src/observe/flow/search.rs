@@ -3,8 +3,8 @@
 //! Inverse-compositional and mean-compensated: with template T, its gradients g and the patch J moved by
 //! the displacement, H = Σ (g − ḡ)(g − ḡ)ᵀ is fixed and each step is −H⁻¹ Σ (g − ḡ)(J − T).
 
-use super::sampling::interpolate;
-use super::{Displacement, FlowField, FlowOptions};
+use super::FlowField;
+use super::displacement::{Displacement, interpolate};
 use crate::geometry::{Grid, Image};
 use crate::observe::pyramid::{Gradients, gradients};
 use crate::simd::vectorised;
@@ -12,29 +12,37 @@ use rayon::prelude::*;
 
 /// Side of a patch, in pixels.
 pub(super) const PATCH: usize = 8;
-/// Pixels of the patch.
-const AREA: f32 = (PATCH * PATCH) as f32;
-/// Width of the border by which the second image is continued, so that patches may leave it.
+/// Pixels of a patch.
+const PATCH_PIXELS: f32 = (PATCH * PATCH) as f32;
+/// Distance of neighbouring patches, in pixels of each level: smaller is slower and denser.
+const PATCH_STRIDE_PX: usize = 4;
+/// Most iterations of a patch at a level.
+const ITERATIONS: usize = 12;
+/// How often a patch tries what its four neighbours found; twice as often at the coarsest level.
+const PROPAGATION_ROUNDS: usize = 2;
+/// Width of the border by which the second image is continued, in pixels, so that patches may leave it.
 const MARGIN: usize = 2 * PATCH;
 /// Added to the diagonal of H, in (grey levels per pixel)²: without texture a patch stays where it began.
 const DAMPING: f32 = 32.0;
 /// A patch that strays farther than this from where it began, in pixels of its level, is put back.
-const MAX_STRAY: f32 = PATCH as f32;
+const MAX_STRAY_PX: f32 = PATCH as f32;
 /// A patch is done when its step is shorter than this, in pixels of its level.
-const SMALL_STEP: f32 = 0.02;
-/// What a neighbour found is taken up only if it lowers the cost by this factor.
+const SETTLED_PX: f32 = 0.02;
+/// Factor by which what a neighbour found must lower the cost to be taken up.
 const CLEARLY_BETTER: f32 = 0.95;
+/// A neighbour whose match differs by less than this (sum of both components), in pixels of the level, has found the same.
+const SAME_MATCH_PX: f32 = 0.25;
 
 /// Two images of one level, made ready for search.
-pub(super) struct Pair<'a> {
+pub(super) struct SearchPair<'a> {
     pub from: &'a Image,
     gradients: Gradients,
     /// The second image with a border of [`MARGIN`] repeated pixels.
     to: Image,
 }
 
-impl<'a> Pair<'a> {
-    pub fn new(from: &'a Image, to: &Image) -> Self {
+impl<'a> SearchPair<'a> {
+    pub(super) fn new(from: &'a Image, to: &Image) -> Self {
         let (width, height) = to.size();
         let mut padded = Grid::filled(width + 2 * MARGIN, height + 2 * MARGIN, 0.0_f32);
         let stride = padded.width();
@@ -49,7 +57,7 @@ impl<'a> Pair<'a> {
 
     /// The 8×8 pixels of the second image at (x, y), bilinear; clamped to the border's outer edge.
     #[inline(always)]
-    pub fn patch(&self, x: f32, y: f32) -> [[f32; PATCH]; PATCH] {
+    pub(super) fn patch(&self, x: f32, y: f32) -> [[f32; PATCH]; PATCH] {
         let place = |c: f32, size: usize| {
             let c = (c + MARGIN as f32).clamp(0.0, (size - PATCH - 2) as f32);
             (c as usize, c - c.floor())
@@ -90,19 +98,19 @@ pub(super) struct Match {
 pub(super) struct Patches {
     pub columns: usize,
     pub rows: usize,
-    stride: usize,
     size: (usize, usize),
     pub matches: Vec<Match>,
 }
 
 impl Patches {
     /// Upper left pixel of the patch (column, row).
-    pub fn corner(&self, column: usize, row: usize) -> (usize, usize) {
-        ((column * self.stride).min(self.size.0 - PATCH), (row * self.stride).min(self.size.1 - PATCH))
+    pub(super) fn corner(&self, column: usize, row: usize) -> (usize, usize) {
+        (
+            (column * PATCH_STRIDE_PX).min(self.size.0 - PATCH),
+            (row * PATCH_STRIDE_PX).min(self.size.1 - PATCH),
+        )
     }
-}
 
-impl Patches {
     fn take(&mut self, templates: &[(usize, Template)], found: &[Match]) {
         for ((i, _), found) in templates.iter().zip(found) {
             self.matches[*i] = *found;
@@ -144,14 +152,14 @@ fn dot(a: &[[f32; PATCH]; PATCH], b: &[[f32; PATCH]; PATCH]) -> f32 {
 }
 
 impl Template {
-    fn new(pair: &Pair<'_>, (x, y): (usize, usize)) -> Self {
+    fn new(pair: &SearchPair<'_>, (x, y): (usize, usize)) -> Self {
         const ONES: [[f32; PATCH]; PATCH] = [[1.0; PATCH]; PATCH];
         let grey = block(pair.from, x, y);
         let (du, dv) = (block(&pair.gradients.du, x, y), block(&pair.gradients.dv, x, y));
-        let (mean_du, mean_dv) = (dot(&du, &ONES) / AREA, dot(&dv, &ONES) / AREA);
-        let uu = dot(&du, &du) - AREA * mean_du * mean_du + DAMPING;
-        let uv = dot(&du, &dv) - AREA * mean_du * mean_dv;
-        let vv = dot(&dv, &dv) - AREA * mean_dv * mean_dv + DAMPING;
+        let (mean_du, mean_dv) = (dot(&du, &ONES) / PATCH_PIXELS, dot(&dv, &ONES) / PATCH_PIXELS);
+        let uu = dot(&du, &du) - PATCH_PIXELS * mean_du * mean_du + DAMPING;
+        let uv = dot(&du, &dv) - PATCH_PIXELS * mean_du * mean_dv;
+        let vv = dot(&dv, &dv) - PATCH_PIXELS * mean_dv * mean_dv + DAMPING;
         let det = uu * vv - uv * uv;
         Self {
             x: x as f32,
@@ -167,7 +175,7 @@ impl Template {
 
     /// The cost of a displacement, and the step that lowers it.
     #[inline(always)]
-    fn evaluate(&self, pair: &Pair<'_>, u: f32, v: f32) -> (f32, [f32; 2]) {
+    fn evaluate(&self, pair: &SearchPair<'_>, u: f32, v: f32) -> (f32, [f32; 2]) {
         let moved = pair.patch(self.x + u, self.y + v);
         let [mut sum, mut squares, mut du, mut dv] = [[0.0_f32; PATCH]; 4];
         for (k, moved) in moved.iter().enumerate() {
@@ -180,21 +188,22 @@ impl Template {
             }
         }
         let total = |lanes: [f32; PATCH]| lanes.iter().sum::<f32>();
-        let mean = total(sum) / AREA;
-        let cost = total(squares) / AREA - mean * mean;
-        let (bu, bv) = (total(du) - AREA * mean * self.mean_du, total(dv) - AREA * mean * self.mean_dv);
+        let mean = total(sum) / PATCH_PIXELS;
+        let cost = total(squares) / PATCH_PIXELS - mean * mean;
+        let (bu, bv) =
+            (total(du) - PATCH_PIXELS * mean * self.mean_du, total(dv) - PATCH_PIXELS * mean * self.mean_dv);
         let [uu, uv, vv] = self.inverse;
         (cost, [-(uu * bu + uv * bv), -(uv * bu + vv * bv)])
     }
 
     /// Descend from (u, v); where it began if that leads nowhere.
     #[inline(always)]
-    fn descend(&self, pair: &Pair<'_>, u: f32, v: f32, iterations: usize) -> Match {
+    fn descend(&self, pair: &SearchPair<'_>, u: f32, v: f32) -> Match {
         let (cost, mut step) = self.evaluate(pair, u, v);
         let mut best = Match { u, v, cost };
-        for _ in 0..iterations {
+        for _ in 0..ITERATIONS {
             let (next_u, next_v) = (best.u + step[0], best.v + step[1]);
-            let is_near = (next_u - u).abs().max((next_v - v).abs()) < MAX_STRAY;
+            let is_near = (next_u - u).abs().max((next_v - v).abs()) < MAX_STRAY_PX;
             if !is_near {
                 return Match { u, v, cost };
             }
@@ -203,7 +212,7 @@ impl Template {
             if is_better {
                 best = Match { u: next_u, v: next_v, cost: next_cost };
             }
-            if !is_better || step[0].abs().max(step[1].abs()) < SMALL_STEP {
+            if !is_better || step[0].abs().max(step[1].abs()) < SETTLED_PX {
                 break;
             }
             step = next_step;
@@ -219,17 +228,15 @@ impl Template {
 /// The coarsest level gets more rounds of that, since it has nothing else to begin with. Patches whose
 /// upper left pixel is not `wanted` keep the prediction.
 pub(super) fn search(
-    pair: &Pair<'_>,
+    pair: &SearchPair<'_>,
     coarser: Option<&Displacement>,
     prediction: Option<(&FlowField, usize)>,
     wanted: impl Fn(usize, usize) -> bool + Sync,
     is_coarsest: bool,
-    options: &FlowOptions,
 ) -> Patches {
     let size = pair.from.size();
-    let stride = options.patch_stride_px;
-    let count = |side: usize| (side - PATCH).div_ceil(stride) + 1;
-    let mut patches = Patches { columns: count(size.0), rows: count(size.1), stride, size, matches: vec![] };
+    let count = |side: usize| (side - PATCH).div_ceil(PATCH_STRIDE_PX) + 1;
+    let mut patches = Patches { columns: count(size.0), rows: count(size.1), size, matches: vec![] };
     let places: Vec<(usize, usize)> =
         (0..patches.rows).flat_map(|row| (0..patches.columns).map(move |column| (column, row))).collect();
     let templates: Vec<(usize, Template)> = places
@@ -252,16 +259,15 @@ pub(super) fn search(
     } else {
         vec![Match { u: 0.0, v: 0.0, cost: 0.0 }; places.len()]
     };
-    let iterations = options.search_iterations;
     let found: Vec<Match> = templates
         .par_iter()
         .map(|(_, template)| {
             let (u, v) = begin(pair, template, centre(template.x, template.y), coarser, prediction);
-            descend(pair, template, u, v, iterations)
+            descend(pair, template, u, v)
         })
         .collect();
     patches.take(&templates, &found);
-    for _ in 0..options.propagation_rounds * if is_coarsest { 2 } else { 1 } {
+    for _ in 0..PROPAGATION_ROUNDS * if is_coarsest { 2 } else { 1 } {
         let before = &patches.matches;
         let columns = patches.columns;
         let after = |(i, template): &(usize, Template)| {
@@ -272,7 +278,7 @@ pub(super) fn search(
                 (row > 0).then(|| i - columns),
                 (row + 1 < patches.rows).then_some(i + columns),
             ];
-            from_neighbours(pair, template, before, *i, neighbours, iterations)
+            from_neighbours(pair, template, before, *i, neighbours)
         };
         let found: Vec<Match> = templates.par_iter().map(after).collect();
         patches.take(&templates, &found);
@@ -295,21 +301,21 @@ fn predicted((flow, level): (&FlowField, usize), (x, y): (f32, f32)) -> Option<(
 
 vectorised! {
 /// [`Template::descend`].
-descend(pair: &Pair<'_>, template: &Template, u: f32, v: f32, iterations: usize) -> Match {
-    template.descend(pair, u, v, iterations)
+descend(pair: &SearchPair<'_>, template: &Template, u: f32, v: f32) -> Match {
+    template.descend(pair, u, v)
 }
 }
 
 vectorised! {
 /// [`Template::evaluate`], the cost alone.
-cost(pair: &Pair<'_>, template: &Template, u: f32, v: f32) -> f32 {
+cost(pair: &SearchPair<'_>, template: &Template, u: f32, v: f32) -> f32 {
     template.evaluate(pair, u, v).0
 }
 }
 
 /// Where a patch begins: the better of the coarser level's displacement and the predicted one.
 fn begin(
-    pair: &Pair<'_>,
+    pair: &SearchPair<'_>,
     template: &Template,
     (x, y): (f32, f32),
     coarser: Option<&Displacement>,
@@ -326,17 +332,16 @@ fn begin(
 
 /// The best of a patch's own match and its neighbours', taken up and refined if clearly better.
 fn from_neighbours(
-    pair: &Pair<'_>,
+    pair: &SearchPair<'_>,
     template: &Template,
     before: &[Match],
     own: usize,
     neighbours: [Option<usize>; 4],
-    iterations: usize,
 ) -> Match {
     let own = before[own];
     let mut best = Match { cost: own.cost * CLEARLY_BETTER, ..own };
     for other in neighbours.into_iter().flatten().map(|i| before[i]) {
-        if (other.u - own.u).abs() + (other.v - own.v).abs() < 0.25 {
+        if (other.u - own.u).abs() + (other.v - own.v).abs() < SAME_MATCH_PX {
             continue;
         }
         let cost = cost(pair, template, other.u, other.v);
@@ -344,9 +349,5 @@ fn from_neighbours(
             best = Match { cost, ..other };
         }
     }
-    if best.cost < own.cost * CLEARLY_BETTER {
-        descend(pair, template, best.u, best.v, iterations)
-    } else {
-        own
-    }
+    if best.cost < own.cost * CLEARLY_BETTER { descend(pair, template, best.u, best.v) } else { own }
 }

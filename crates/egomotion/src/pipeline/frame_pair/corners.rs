@@ -5,7 +5,9 @@ use crate::estimate::TrackSource;
 use crate::estimate::Unsolvable;
 use crate::geometry::Twist;
 use crate::observe::StereoTrack;
-use crate::observe::tracks::{Expected, Hints, StereoCorner, Trace, follow, measured, stereo_corners};
+use crate::observe::tracks::{
+    Hints, SearchStart, StereoCorner, Trace, follow, stereo_corners, tracks_from_traces,
+};
 use crate::pipeline::solve::first_motion;
 
 /// About this many corners find the motion that guides the others. With more it takes longer; with fewer the motion is less certain.
@@ -31,11 +33,11 @@ impl FramePair<'_> {
         let corners = stereo_corners(&before.images, &before.corners, rig, self.hints(None), options);
         let motion = self.guiding_motion(&corners, expected);
         let traces = match &motion {
-            Ok(motion) => self.follow(&corners, Some(motion), Expected::Near),
+            Ok(motion) => self.follow(&corners, Some(motion), SearchStart::FullResolution),
             Err(_) => Vec::new(),
         };
         FollowedCorners {
-            tracks: measured(&traces, rig),
+            tracks: tracks_from_traces(&traces, rig),
             motion,
             later: traces.iter().map(|trace| trace.after).collect(),
         }
@@ -50,30 +52,30 @@ impl FramePair<'_> {
         let step = corners.len().div_ceil(GUIDING_CORNERS).max(1);
         let guiding: Vec<StereoCorner> = corners.iter().step_by(step).copied().collect();
         let mut found = match expected {
-            Some(_) => self.follow(&guiding, expected, Expected::FromLevel(PREDICTED_LEVEL)),
+            Some(_) => self.follow(&guiding, expected, SearchStart::Level(PREDICTED_LEVEL)),
             None => Vec::new(),
         };
         // A wrong expectation loses most corners; then searching without it finds more.
         if 2 * found.len() < guiding.len() {
-            let free = self.follow(&guiding, None, Expected::FromLevel(usize::MAX));
+            let free = self.follow(&guiding, None, SearchStart::Level(usize::MAX));
             if free.len() > found.len() {
                 found = free;
             }
         }
-        first_motion(&measured(&found, self.interval.rig), &self.interval, expected)
+        first_motion(&tracks_from_traces(&found, self.interval.rig), &self.interval, expected)
     }
 
-    fn follow(&self, corners: &[StereoCorner], motion: Option<&Twist>, expected: Expected) -> Vec<Trace> {
+    fn follow(&self, corners: &[StereoCorner], motion: Option<&Twist>, start: SearchStart) -> Vec<Trace> {
         let (before, after) = self.images();
         let (rig, options) = (self.interval.rig, &self.interval.config.tracks);
-        follow(before, after, corners, rig, self.hints(motion), expected, options)
+        follow(before, after, corners, rig, self.hints(motion), start, options)
     }
 
     fn hints<'b>(&'b self, motion: Option<&'b Twist>) -> Hints<'b> {
         let shift = self.before.disparity.as_ref().map(|d| &d.shift);
         let maps = self.before.disparity.as_ref().zip(self.after.disparity.as_ref());
         let of_depth = self.interval.plan.source == TrackSource::Image;
-        let given = maps.filter(|_| of_depth).map(|(before, after)| [before, after]);
-        Hints { shift, motion, mask: self.masks[0], mask_right: self.masks[1], given }
+        let external_disparity = maps.filter(|_| of_depth).map(|(before, after)| [before, after]);
+        Hints { shift, motion, mask: self.masks[0], mask_right: self.masks[1], external_disparity }
     }
 }

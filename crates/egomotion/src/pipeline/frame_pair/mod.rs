@@ -14,9 +14,8 @@ use crate::estimate::TrackSource;
 use crate::estimate::Unsolvable;
 use crate::geometry::{Grid, StereoRig, Twist};
 use crate::observe::flow::FlowSpace;
-use crate::observe::row_disagreement::row_disagreement;
 use crate::observe::tracks::StereoCorner;
-use crate::observe::{DensePair, FlowField, StereoPyramid};
+use crate::observe::{DensePair, FlowField, StereoPyramid, row_disagreement};
 use corners::FollowedCorners;
 use flows::Flows;
 
@@ -129,7 +128,7 @@ impl<'a> FramePair<'a> {
             after: self.after.disparity.as_ref()?,
             flow: &flows.left,
             flow_right: flows.right.as_ref(),
-            given: self.interval.plan.source == TrackSource::Image,
+            external_disparity: self.interval.plan.source == TrackSource::Image,
         })
     }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use crate::geometry::distribution::CHI2_1_P9973;
 use crate::geometry::{Cells, Gaussian};
 use crate::motion::RigidPrediction;
-use crate::observe::temporal_disparity::{Seen, disparity_change};
+use crate::observe::temporal_disparity::{PatchMotion, disparity_change};
 use crate::observe::{DensePair, StereoPyramid};
 
 /// Side of the cells in which moving pixels are gathered, in pixels. [`Moving::index`] divides by it, so it is a power of
@@ -181,8 +181,11 @@ fn change_at(
     d: f64,
 ) -> Option<Gaussian<1>> {
     let flow = pair.flow.get(u, v)?.mean;
-    let seen =
-        Seen { at: (u as f64, v as f64), shift: pair.rig.shift_from_disparity(d), flow: (flow.x, flow.y) };
+    let seen = PatchMotion {
+        at: (u as f64, v as f64),
+        shift: pair.rig.shift_from_disparity(d),
+        flow: (flow.x, flow.y),
+    };
     let (x, y) = pair.rig.image_from_pixel(u as f64, v as f64);
     let by_maps = pair.disparities(u, v).map(|maps| maps.mean.y - maps.mean.x);
     let by_motion = rigid.moved(&nalgebra::Vector3::new(x, y, d)).map(|moved| moved.z - d);

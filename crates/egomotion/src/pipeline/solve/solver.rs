@@ -1,17 +1,12 @@
 //! The methods on observations at hand, each with the configured estimator.
 
 use crate::constrain::{binocular_flow, dcce, image_flow};
-use crate::estimate::LikelihoodTerm;
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
-use crate::estimate::augmented_step;
-use crate::estimate::errors_in_variables;
-use crate::estimate::m_estimate;
-use crate::estimate::two_step;
-use crate::estimate::{Blocks, LinearFit, MotionEstimate, Row, Tolerance, Unsolvable};
-use crate::estimate::{LmedsOptions, lmeds};
-use crate::estimate::{MaximumLikelihood, maximum_likelihood};
-use crate::estimate::{SensedTrack, SensorErrors, SensorPrior, TrackSource};
-use crate::estimate::{Weighting, least_squares};
+use crate::estimate::{
+    Blocks, LikelihoodTerm, LinearFit, LmedsOptions, MaximumLikelihood, MotionEstimate, Row, SensedTrack,
+    SensorErrors, SensorPrior, Tolerance, TrackSource, Unsolvable, Weighting, augmented_step,
+    errors_in_variables, least_squares, lmeds, m_estimate, maximum_likelihood, two_step,
+};
 use crate::geometry::{StereoRig, Twist};
 use crate::observe::{DepthChange, StereoFlow, StereoTrack};
 use crate::pipeline::config::{Config, EstimatorKind};

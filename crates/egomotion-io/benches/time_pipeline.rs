@@ -21,8 +21,8 @@ const REPEATS: usize = 10;
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let [_, folder, frames, threads] = &arguments[..] else {
-        eprintln!("usage: time_pipeline FOLDER FRAMES THREADS");
-        std::process::exit(2);
+        println!("usage: time_pipeline FOLDER FRAMES THREADS");
+        return;
     };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.parse().unwrap());
     pool.build_global().unwrap();

@@ -12,8 +12,8 @@ use egomotion::pipeline::{Config, Observe, StereoFrame, StereoMotion};
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let [_, folder, frames, corners] = &arguments[..] else {
-        eprintln!("usage: time_tracks FOLDER FRAMES CORNERS");
-        std::process::exit(2);
+        println!("usage: time_tracks FOLDER FRAMES CORNERS");
+        return;
     };
     let (frames, corners): (usize, usize) = (frames.parse().unwrap(), corners.parse().unwrap());
     let read = |side: usize, k: usize| {

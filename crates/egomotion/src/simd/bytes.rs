@@ -1,13 +1,13 @@
-//! Bytes side by side, and kernels compiled for the widest vectors of the processor.
+//! Bytes side by side: one operation acts on 32 of them at once.
 //!
-//! A kernel is written once over [`Bytes`] and runs on 256-bit registers where the processor has
-//! AVX2, on arrays everywhere else. Both compute the same integers.
+//! [`Bytes`] is a 256-bit register where the processor has AVX2, an array everywhere else. Both compute
+//! the same integers.
 
 /// Bytes in a vector.
-pub(super) const LANES: usize = 32;
+pub(crate) const LANES: usize = 32;
 
 /// So many bytes, on which one operation acts at once.
-pub(super) trait Bytes: Copy {
+pub(crate) trait Bytes: Copy {
     /// The same byte everywhere.
     fn splat(value: u8) -> Self;
     /// From an array.
@@ -32,8 +32,6 @@ pub(super) trait Bytes: Copy {
     fn moved_up(self, before: Self) -> Self;
     /// Each byte moved down by one; the first of `after` becomes the last.
     fn moved_down(self, after: Self) -> Self;
-    /// Half of each byte, rounded down.
-    fn halved(self) -> Self;
 
     /// The bytes from `start` on.
     #[inline(always)]
@@ -52,7 +50,7 @@ pub(super) trait Bytes: Copy {
 
 /// The plain version: an array.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Array([u8; LANES]);
+pub(crate) struct Array([u8; LANES]);
 
 impl Array {
     #[inline(always)]
@@ -117,24 +115,20 @@ impl Bytes for Array {
         moved[..LANES - 1].copy_from_slice(&self.0[1..]);
         Self(moved)
     }
-    #[inline(always)]
-    fn halved(self) -> Self {
-        self.with(self, |a, _| a >> 1)
-    }
 }
 
 /// The version for AVX2: a register.
 #[cfg(target_arch = "x86_64")]
-mod avx2 {
-    #![allow(unsafe_code, reason = "registers make a frame five times as fast; see `widest`")]
+pub(super) mod avx2 {
+    #![allow(unsafe_code, reason = "registers make a frame five times as fast; see `super::super::widest`")]
 
     use std::arch::x86_64::*;
 
     use super::{Bytes, LANES};
 
-    /// 32 bytes in a register. Only [`super::widest`] names it, after asking for AVX2.
+    /// 32 bytes in a register. Only [`widest`](super::super::widest) names it, after asking for AVX2.
     #[derive(Debug, Clone, Copy)]
-    pub(super) struct Register(__m256i);
+    pub(crate) struct Register(__m256i);
 
     // SAFETY, of all that follows: the processor has AVX2, because `widest` has asked; arrays of 32
     // bytes and the register are of one size, and every pattern of bits is a value of either.
@@ -219,56 +213,13 @@ mod avx2 {
                 Self(_mm256_alignr_epi8::<1>(middle, self.0))
             }
         }
-        #[inline(always)]
-        fn halved(self) -> Self {
-            unsafe { Self(_mm256_and_si256(_mm256_srli_epi16::<1>(self.0), _mm256_set1_epi8(127))) }
-        }
     }
-}
-
-/// A loop worth compiling for wide vectors.
-///
-/// `run` and all that it calls in its loop must be `#[inline(always)]`: only then is it compiled
-/// anew, with the instructions of the processor it runs on. Integers give the same answer with any
-/// instructions, and so do floating-point numbers, of which Rust fuses and reorders nothing.
-pub(super) trait Kernel {
-    /// What it answers.
-    type Output;
-    /// The loop, on vectors of this kind.
-    fn run<B: Bytes>(self) -> Self::Output;
-}
-
-/// Run a kernel with the widest vectors of this processor.
-pub(super) fn widest<K: Kernel>(kernel: K) -> K::Output {
-    #[cfg(test)]
-    if tests::PLAIN.load(std::sync::atomic::Ordering::Relaxed) {
-        return kernel.run::<Array>();
-    }
-    #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2")
-        && std::arch::is_x86_feature_detected!("bmi1")
-        && std::arch::is_x86_feature_detected!("popcnt")
-    {
-        // Of the three no processor with AVX2 lacks any.
-        #[target_feature(enable = "avx2,bmi1,popcnt")]
-        fn wide<K: Kernel>(kernel: K) -> K::Output {
-            kernel.run::<avx2::Register>()
-        }
-        #[allow(unsafe_code, reason = "the lines above ask whether the processor has the instructions")]
-        // SAFETY: it has them.
-        return unsafe { wide(kernel) };
-    }
-    kernel.run::<Array>()
 }
 
 #[cfg(test)]
-pub(super) mod tests {
-    use std::sync::atomic::AtomicBool;
-
+mod tests {
     use super::*;
-
-    /// Makes every kernel run on arrays. Other tests may run meanwhile: their answers are the same.
-    pub static PLAIN: AtomicBool = AtomicBool::new(false);
+    use crate::simd::{Kernel, widest};
 
     /// All operations of two vectors, one after the other.
     struct Operations([u8; LANES], [u8; LANES]);
@@ -286,7 +237,6 @@ pub(super) mod tests {
                 a.least(),
                 a.moved_up(b),
                 a.moved_down(b),
-                a.halved(),
                 B::splat(self.0[3]),
             ];
             (answers.map(B::to_array).to_vec(), a.at_most(b))

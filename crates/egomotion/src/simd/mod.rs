@@ -1,4 +1,11 @@
-//! Vector kernels: each is compiled twice, for any machine and for the widest vectors of this one.
+//! Vector kernels: each is compiled twice, for any machine and for AVX2, and the machine is asked at every call.
+//!
+//! [`vectorised!`] defines a function that is compiled so; [`Kernel`] is for loops over [`Bytes`], whose
+//! operations the compiler would not find by itself. Nothing else in the workspace asks for a processor's instructions.
+
+mod bytes;
+
+pub(crate) use bytes::{Array, Bytes, LANES};
 
 /// Defines a function that runs compiled for AVX2 where the machine has it.
 ///
@@ -28,6 +35,37 @@ macro_rules! vectorised {
     };
 }
 pub(crate) use vectorised;
+
+/// A loop over [`Bytes`], worth compiling for wide vectors; [`widest`] runs it.
+///
+/// `run` and all that it calls in its loop must be `#[inline(always)]`: only then is it compiled
+/// anew, with the instructions of the processor it runs on. Integers give the same answer with any
+/// instructions, and so do floating-point numbers, of which Rust fuses and reorders nothing.
+pub(crate) trait Kernel {
+    /// What it answers.
+    type Output;
+    /// The loop, on vectors of this kind.
+    fn run<B: Bytes>(self) -> Self::Output;
+}
+
+/// Run a kernel with the widest vectors of this processor.
+pub(crate) fn widest<K: Kernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if has_avx2()
+        && std::arch::is_x86_feature_detected!("bmi1")
+        && std::arch::is_x86_feature_detected!("popcnt")
+    {
+        // Of the three no processor with AVX2 lacks any.
+        #[target_feature(enable = "avx2,bmi1,popcnt")]
+        fn wide<K: Kernel>(kernel: K) -> K::Output {
+            kernel.run::<bytes::avx2::Register>()
+        }
+        #[allow(unsafe_code, reason = "the lines above ask whether the processor has the instructions")]
+        // SAFETY: it has them.
+        return unsafe { wide(kernel) };
+    }
+    kernel.run::<Array>()
+}
 
 /// Whether to use AVX2.
 #[cfg(target_arch = "x86_64")]

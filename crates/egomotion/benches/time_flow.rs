@@ -25,8 +25,8 @@ fn main() {
             predicted(&images, &rig, repeats.parse().unwrap())
         }
         _ => {
-            eprintln!("usage: time_flow REPEATS OUT FROM TO | LEFT RIGHT LEFT_LATER RIGHT_LATER F CX CY B");
-            std::process::exit(2);
+            println!("usage: time_flow REPEATS OUT FROM TO | LEFT RIGHT LEFT_LATER RIGHT_LATER F CX CY B");
+            return;
         }
     };
     println!("{}", times.iter().map(|t| format!("{t:.2}")).collect::<Vec<_>>().join(" "));

@@ -1,9 +1,75 @@
-//! Speckles: connected pieces of disparity too small to be believed.
+//! Which winners to believe: uniqueness, left-right agreement, speckles.
 
 use rayon::prelude::*;
 
-/// Rows labelled together. The answer does not depend on them.
+/// The cost of a level that does not exist: larger than that of any that does.
+pub(super) const NO_LEVEL: u16 = u16::MAX;
+/// Rows labelled together, in rows. The answer does not depend on them: more make the strips' work coarser,
+/// fewer leave more borders to join.
 const STRIP_ROWS: usize = 64;
+
+/// The level of least cost of a pixel.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Winner {
+    /// The level.
+    pub level: u16,
+    /// Cost of the level below, of the level, and of the one above; [`NO_LEVEL`] where there is none.
+    pub costs: [u16; 3],
+    /// Whether no other level but its neighbours is about as cheap.
+    pub unique: bool,
+}
+
+/// What left pixels claim each pixel of the right row with: the cost (high half) and the level of the
+/// best of them. The last right pixel comes first, so that one left pixel's levels stand side by side.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Claims(Vec<u32>);
+
+impl Claims {
+    /// Forget the last row.
+    fn start_row(&mut self, width: usize) {
+        self.0.clear();
+        self.0.resize(width, u32::MAX);
+    }
+
+    /// Every winner claims its right pixel.
+    pub(super) fn of_winners(&mut self, row: &[Winner]) {
+        self.start_row(row.len());
+        for (u, winner) in row.iter().enumerate() {
+            let claim = u32::from(winner.costs[1]) << 16 | u32::from(winner.level);
+            if let Some(best) = self.0.get_mut(row.len() - 1 - u + usize::from(winner.level)) {
+                *best = claim.min(*best);
+            }
+        }
+    }
+
+    /// Whether the right pixel of left pixel `u` at `level` is claimed at that level, within
+    /// `tolerance`; never outside the right image.
+    pub(super) fn agree(&self, u: usize, level: u16, tolerance: usize) -> bool {
+        let claim = self.0.get(self.0.len() - 1 - u + usize::from(level));
+        claim.is_some_and(|&claim| usize::from((claim as u16).abs_diff(level)) <= tolerance)
+    }
+}
+
+/// The winners of a row to a fraction of a pixel, NaN where not to be believed.
+///
+/// To be believed a winner must be unique, and the right pixel it takes must not belong to a better
+/// match at a level that differs by more than `tolerance`.
+pub(super) fn believe(row: &[Winner], tolerance: usize, claims: &Claims, believed: &mut [f32]) {
+    for ((u, winner), believed) in row.iter().enumerate().zip(believed) {
+        let agrees = claims.agree(u, winner.level, tolerance);
+        *believed =
+            if agrees && winner.unique { f32::from(winner.level) + parabola(winner.costs) } else { f32::NAN };
+    }
+}
+
+/// Offset of the minimum of the parabola through three neighbouring costs, −½ … ½; 0 beside the
+/// end of the levels and where there is no minimum.
+fn parabola(costs: [u16; 3]) -> f32 {
+    let [before, here, after] = costs.map(f32::from);
+    let curvature = before - 2.0 * here + after;
+    let beside_end = costs[0].max(costs[2]) == NO_LEVEL;
+    if curvature > 0.0 && !beside_end { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
+}
 
 /// Neighbours along a row whose values are connected: columns `start` … `end` − 1.
 #[derive(Debug, Clone, Copy)]
@@ -159,6 +225,28 @@ impl Speckles {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_right_pixel_keeps_its_best_left_pixel() {
+        let winner = |level, cost| Winner { level, costs: [99, cost, 99], unique: true };
+        // Left pixels 3 and 5 both claim right pixel 2; left pixel 0 lies outside at level 1.
+        let row = [winner(1, 1), winner(0, 5), winner(0, 50), winner(1, 7), winner(0, 5), winner(3, 4)];
+        let mut claims = Claims::default();
+        claims.of_winners(&row);
+        let mut believed = [0.0; 6];
+        believe(&row, 1, &claims, &mut believed);
+        let kept: Vec<bool> = believed.iter().map(|d| !d.is_nan()).collect();
+        assert_eq!(kept, [false, true, false, false, true, true]);
+        believe(&row, 2, &claims, &mut believed);
+        assert_eq!(believed[3], 1.0);
+    }
+
+    #[test]
+    fn the_parabola_finds_its_minimum() {
+        let costs = [1.0, 0.0, -1.0].map(|d: f64| (1000.0 * (d + 0.3).powi(2)) as u16);
+        assert!((parabola(costs) - 0.3).abs() < 1e-3);
+        assert_eq!((parabola([7, 7, 7]), parabola([NO_LEVEL, 3, 9])), (0.0, 0.0));
+    }
 
     /// Size of the piece of every pixel, by flooding.
     fn flooded(values: &[f32], width: usize, range: f32) -> Vec<usize> {
