@@ -54,7 +54,7 @@ fn comment(text: &mut String, path: &[&str]) {
     let Some(meaning) = meaning(path) else { return };
     let mut line = String::from("#");
     for word in meaning.split("\n\n").next().unwrap_or_default().split_whitespace() {
-        let word = word.replace("[`", "").replace("`]", "").replace('`', "");
+        let word = without_links(word);
         if line.chars().count() + word.chars().count() >= COMMENT_WIDTH {
             text.push_str(&line);
             text.push('\n');
@@ -65,6 +65,15 @@ fn comment(text: &mut String, path: &[&str]) {
     }
     text.push_str(&line);
     text.push('\n');
+}
+
+/// A word of a documentation comment without its marks; of a path in the sources its last name.
+fn without_links(word: &str) -> String {
+    let plain = word.replace("[`", "").replace("`]", "").replace('`', "");
+    match plain.split_once("crate::") {
+        Some((before, path)) => format!("{before}{}", path.rsplit("::").next().unwrap_or(path)),
+        None => plain,
+    }
 }
 
 /// What a word may be, and what each means.

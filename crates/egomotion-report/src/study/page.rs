@@ -26,7 +26,7 @@ pub struct Chapter {
     pub figures: Vec<String>,
     /// Settings as JSON.
     pub settings: String,
-    /// Parts that are done, of how many.
+    /// Number of parts that are done.
     pub done: usize,
     /// Number of parts.
     pub parts: usize,
