@@ -1,6 +1,6 @@
 //! Settings from keywords.
 
-use egomotion::pipeline::{Config, renamed_key};
+use egomotion::pipeline::{Config, former_key_advice};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -21,14 +21,14 @@ pub fn from_keywords<T: DeserializeOwned + Default>(
     }
 }
 
-/// The settings of a pipeline, checked; a key that has another name now is refused with that name.
+/// The settings of a pipeline, checked; a key of an earlier version is refused with what to do about it.
 pub fn config(py: Python<'_>, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Config> {
     let Some(keywords) = keywords else { return Ok(Config::default()) };
     let text = json(py, keywords)?;
     if let Ok(value) = serde_json::from_str::<Value>(&text)
-        && let Some((old, new)) = renamed(&value, &mut Vec::new())
+        && let Some((key, advice)) = former_key(&value, &mut Vec::new())
     {
-        return Err(PyValueError::new_err(format!("the setting `{old}` is now called `{new}`")));
+        return Err(PyValueError::new_err(format!("there is no setting `{key}` any more: {advice}")));
     }
     let config: Config = parse(&text)?;
     config.check().map_err(error::value)?;
@@ -48,11 +48,13 @@ fn parse<T: DeserializeOwned>(text: &str) -> PyResult<T> {
     })
 }
 
-/// The first key below `path` that has another name now, as `part.key`, and that name.
-fn renamed<'a>(settings: &'a Value, path: &mut Vec<&'a str>) -> Option<(String, &'static str)> {
+/// The first key below `path` that settings no longer have, as `part.key`, and what to do about it.
+fn former_key<'a>(settings: &'a Value, path: &mut Vec<&'a str>) -> Option<(String, &'static str)> {
     for (key, value) in settings.as_object()? {
         path.push(key);
-        let found = renamed_key(path).map(|new| (path.join("."), new)).or_else(|| renamed(value, path));
+        let found = former_key_advice(path)
+            .map(|advice| (path.join("."), advice))
+            .or_else(|| former_key(value, path));
         if found.is_some() {
             return found;
         }

@@ -85,7 +85,7 @@ def test_a_renamed_setting_is_refused_with_its_new_name(tmp_path: Path) -> None:
         lambda **settings: em.run(tmp_path, **settings),
     ]
     for call in calls:
-        with pytest.raises(ValueError, match="the setting `window` is now called `vehicle`"):
+        with pytest.raises(ValueError, match="there is no setting `window` any more: write vehicle instead"):
             call(window={"width_m": 2.0})
     assert "vehicle" in em.default_config() and "window" not in em.default_config()
     # The same word elsewhere is no renamed setting.

@@ -183,14 +183,6 @@ pub enum PipelineError {
     Config(#[from] ConfigError),
 }
 
-/// Keys of earlier configurations, with what takes their place now.
-const RENAMED_KEYS: [(&[&str], &str); 1] = [(&["window"], "vehicle")];
-
-/// What to write in place of a key that the configuration no longer has, as `["window"]`; `None` for every other key.
-pub fn renamed_key(path: &[&str]) -> Option<&'static str> {
-    RENAMED_KEYS.iter().find(|(old, _)| *old == path).map(|(_, new)| *new)
-}
-
 impl Config {
     /// The options of maximum likelihood with the seed of the whole configuration mixed in.
     pub(super) fn seeded_likelihood(&self) -> MaximumLikelihoodOptions {

@@ -7,6 +7,7 @@
 mod answer;
 pub mod config;
 mod depth_camera;
+mod former_keys;
 mod frame;
 mod frame_pair;
 mod interpret;
@@ -19,10 +20,9 @@ mod track_motion;
 mod trajectory;
 
 pub use answer::{DenseResults, FrameMotion, Unanswered};
-pub use config::{
-    Approach, Config, ConfigError, EstimatorKind, Method, Observe, PipelineError, meaning, renamed_key,
-};
+pub use config::{Approach, Config, ConfigError, EstimatorKind, Method, Observe, PipelineError, meaning};
 pub use depth_camera::{DepthCamera, DepthNoise, RgbdMotion, VIRTUAL_BASELINE_M};
+pub use former_keys::former_key_advice;
 pub use frame::{Frame, StereoFrame};
 pub use interpret::{MotionMaps, MovingGroup, motion_maps};
 pub use memory::Memory;
