@@ -43,7 +43,7 @@ impl DepthVelocity {
     /// The same with Z at the beginning of the interval, of one that holds Z at its middle.
     ///
     /// Differential observations are taken half-way along the motion, Z_mid = Z + VZ/2.
-    pub(crate) fn from_middle(self) -> Self {
+    pub(crate) fn at_interval_start(self) -> Self {
         let [z_middle, vz] = self.z_vz.mean.into();
         let back = Matrix2::new(1.0, -0.5, 0.0, 1.0);
         Self { z_vz: self.z_vz.propagate(Vector2::new(z_middle - 0.5 * vz, vz), &back) }
@@ -204,11 +204,11 @@ mod tests {
         let cov = Matrix2::new(4e-4, 1e-4, 1e-4, 9e-4);
         let middle = DepthVelocity { z_vz: Gaussian { mean: Vector2::new(1.9, -0.2), cov } };
         let start = DepthVelocity { z_vz: Gaussian { mean: Vector2::new(2.0, -0.2), cov } };
-        for velocity in [middle.from_middle(), start] {
+        for velocity in [middle.at_interval_start(), start] {
             assert!((velocity.looming(0.1).unwrap().value() - 1.0 / 0.9).abs() < 1e-12);
         }
         // Var(Z − VZ/2) = 4e-4 − 1e-4 + 9e-4/4.
-        assert!((middle.from_middle().z_vz.cov[(0, 0)] - 5.25e-4).abs() < 1e-15);
-        assert_eq!(middle.from_middle().vz(), middle.vz());
+        assert!((middle.at_interval_start().z_vz.cov[(0, 0)] - 5.25e-4).abs() < 1e-15);
+        assert_eq!(middle.at_interval_start().vz(), middle.vz());
     }
 }

@@ -200,10 +200,10 @@ fn measured(pair: &DensePair<'_>, config: &Config, u: usize, v: usize) -> Option
             Some(depth_velocity::dcce(&pair.depth_track(u, v)?.depth_change(bf)))
         }
         (Method::Dcce, Approach::Differential) => {
-            Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)).from_middle())
+            Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)).at_interval_start())
         }
         (Method::Dv, Approach::Differential) => {
-            Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf).from_middle())
+            Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf).at_interval_start())
         }
         _ => Some(DepthVelocity::from_disparities(&pair.disparities(u, v)?, bf)),
     }
