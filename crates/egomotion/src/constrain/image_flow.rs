@@ -15,7 +15,7 @@ pub fn constraints(flow: &StereoFlow, rig: &StereoRig, at: &Twist) -> [LinearCon
     let z = rig.depth_disparity_product() / d;
     let point = Vector3::new(x, y, f) * (z / f);
     // The translational part of the flow is proportional to d.
-    let by_disparity =
+    let flow_by_d =
         Vector2::new(f * at.t.x - x * at.t.z, f * at.t.y - y * at.t.z) / rig.depth_disparity_product();
     let cov = &flow.measured.cov;
     let sigma =
@@ -25,13 +25,13 @@ pub fn constraints(flow: &StereoFlow, rig: &StereoRig, at: &Twist) -> [LinearCon
             point,
             normal: Vector3::new(f, 0.0, -x) / z,
             rate: flow.measured.mean[1],
-            sigma: sigma(1, by_disparity.x),
+            sigma: sigma(1, flow_by_d.x),
         },
         LinearConstraint {
             point,
             normal: Vector3::new(0.0, f, -y) / z,
             rate: flow.measured.mean[2],
-            sigma: sigma(2, by_disparity.y),
+            sigma: sigma(2, flow_by_d.y),
         },
     ]
 }

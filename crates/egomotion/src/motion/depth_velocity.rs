@@ -33,15 +33,17 @@ impl DepthVelocity {
         let [z, vz] = self.z_vz.mean.into();
         let (cov, per_later) = (&self.z_vz.cov, (z + vz).recip());
         // −VZ/Z′ = Z/Z′ − 1, whose gradient by (Z, VZ) is (VZ, −Z)/Z′².
-        let (by_z, by_vz) = (vz * per_later * per_later, -z * per_later * per_later);
-        let variance = by_z * by_z * cov.m11 + 2.0 * by_z * by_vz * cov.m12 + by_vz * by_vz * cov.m22;
+        let (looming_by_z, looming_by_vz) = (vz * per_later * per_later, -z * per_later * per_later);
+        let variance = looming_by_z * looming_by_z * cov.m11
+            + 2.0 * looming_by_z * looming_by_vz * cov.m12
+            + looming_by_vz * looming_by_vz * cov.m22;
         Gaussian::scalar(-vz * per_later / dt_s, variance / (dt_s * dt_s))
     }
 
     /// The same with Z at the beginning of the interval, of one that holds Z at its middle.
     ///
     /// Differential observations are taken half-way along the motion, Z_mid = Z + VZ/2.
-    pub(crate) fn from_middle(self) -> Self {
+    pub(crate) fn at_interval_start(self) -> Self {
         let [z_middle, vz] = self.z_vz.mean.into();
         let back = Matrix2::new(1.0, -0.5, 0.0, 1.0);
         Self { z_vz: self.z_vz.propagate(Vector2::new(z_middle - 0.5 * vz, vz), &back) }
@@ -63,13 +65,13 @@ impl DepthVelocity {
 pub fn dcce(change: &DepthChange) -> DepthVelocity {
     let [z, zx, zy, zt] = change.depth.mean.into();
     let [vx, vy] = change.flow.mean.into();
-    let by_depth = SMatrix::<f64, 2, 4>::from_rows(&[
+    let depth_jacobian = SMatrix::<f64, 2, 4>::from_rows(&[
         Vector4::x().transpose(),
         Vector4::new(0.0, vx, vy, 1.0).transpose(),
     ]);
-    let by_flow = Vector2::new(zx, zy);
-    let mut z_vz = change.depth.propagate(Vector2::new(z, zx * vx + zy * vy + zt), &by_depth);
-    z_vz.cov[(1, 1)] += by_flow.dot(&(change.flow.cov * by_flow));
+    let vz_by_flow = Vector2::new(zx, zy);
+    let mut z_vz = change.depth.propagate(Vector2::new(z, zx * vx + zy * vy + zt), &depth_jacobian);
+    z_vz.cov[(1, 1)] += vz_by_flow.dot(&(change.flow.cov * vz_by_flow));
     DepthVelocity { z_vz }
 }
 
@@ -202,11 +204,11 @@ mod tests {
         let cov = Matrix2::new(4e-4, 1e-4, 1e-4, 9e-4);
         let middle = DepthVelocity { z_vz: Gaussian { mean: Vector2::new(1.9, -0.2), cov } };
         let start = DepthVelocity { z_vz: Gaussian { mean: Vector2::new(2.0, -0.2), cov } };
-        for velocity in [middle.from_middle(), start] {
+        for velocity in [middle.at_interval_start(), start] {
             assert!((velocity.looming(0.1).unwrap().value() - 1.0 / 0.9).abs() < 1e-12);
         }
         // Var(Z − VZ/2) = 4e-4 − 1e-4 + 9e-4/4.
-        assert!((middle.from_middle().z_vz.cov[(0, 0)] - 5.25e-4).abs() < 1e-15);
-        assert_eq!(middle.from_middle().vz(), middle.vz());
+        assert!((middle.at_interval_start().z_vz.cov[(0, 0)] - 5.25e-4).abs() < 1e-15);
+        assert_eq!(middle.at_interval_start().vz(), middle.vz());
     }
 }

@@ -61,7 +61,7 @@ impl ObstacleCriteria {
     /// Every pixel is a point.
     pub const DENSE: Self = Self { cell_px: 16, cell_share: 0.25, region_points: 100 };
     /// Points are tracks, about thirty pixels apart.
-    pub(crate) const SPARSE: Self = Self { cell_px: 96, cell_share: 0.1, region_points: 3 };
+    pub const SPARSE: Self = Self { cell_px: 96, cell_share: 0.1, region_points: 3 };
 }
 
 /// Fewest crossing points of a cell that takes part: one or two may be mismatches.

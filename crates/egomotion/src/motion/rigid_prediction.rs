@@ -46,9 +46,9 @@ impl<'a> RigidPrediction<'a> {
     pub fn new(phi: &Gaussian<6>, offset: DisparityOffset, rig: &'a StereoRig) -> Option<Self> {
         let twist = Twist::from_vector(&phi.mean);
         // exp(φ + dφ) = exp(J dφ) exp(φ).
-        let by_phi = twist.left_jacobian();
-        let motion_cov = by_phi * phi.cov * by_phi.transpose();
-        let motion_by_offset = by_phi * offset.phi_per_px;
+        let phi_jacobian = twist.left_jacobian();
+        let motion_cov = phi_jacobian * phi.cov * phi_jacobian.transpose();
+        let motion_by_offset = phi_jacobian * offset.phi_per_px;
         phi.cov.iter().all(|v| v.is_finite()).then(|| Self {
             rig,
             motion: twist.exp(),
@@ -79,15 +79,15 @@ impl<'a> RigidPrediction<'a> {
         let Some(p) = self.rig.point(&predicted) else { return false };
         let apart = xyd.xy() + flow.mean - predicted.xy();
         // P is in proportion to 1/d.
-        let by_d = self.rig.projected_change(&p, &((p - self.motion.translation) / -xyd.z)).xy();
-        let cov = flow.cov + by_d * by_d.transpose() * d_variance;
+        let flow_by_d = self.rig.projected_change(&p, &((p - self.motion.translation) / -xyd.z)).xy();
+        let cov = flow.cov + flow_by_d * flow_by_d.transpose() * d_variance;
         if !outside(&apart, &cov) {
             return false;
         }
-        let by_motion = self.rig.velocity_jacobian(&predicted).fixed_rows::<2>(0).into_owned();
-        let by_offset = (by_motion * self.motion_by_offset + by_d) * self.offset_sigma_px;
-        let by_phi = by_motion * self.motion_cov * by_motion.transpose();
-        outside(&apart, &(cov + by_phi + by_offset * by_offset.transpose()))
+        let flow_jacobian = self.rig.velocity_jacobian(&predicted).fixed_rows::<2>(0).into_owned();
+        let flow_by_offset = (flow_jacobian * self.motion_by_offset + flow_by_d) * self.offset_sigma_px;
+        let motion_part = flow_jacobian * self.motion_cov * flow_jacobian.transpose();
+        outside(&apart, &(cov + motion_part + flow_by_offset * flow_by_offset.transpose()))
     }
 
     /// Z and VZ of the still world's point (x, y, d), from the noise `sigma_d` of d and that of φ.
@@ -108,10 +108,11 @@ impl<'a> RigidPrediction<'a> {
         let vz_by_d = (self.motion.translation.z - (moved.z - p.z)) * per_px;
         let var = sigma_d * sigma_d;
         // The offset moves φ and this pixel's own disparity together.
-        let (offset_sigma, by_offset) = (self.offset_sigma_px, &self.depth_by_offset);
+        let (offset_sigma, depth_by_offset) = (self.offset_sigma_px, &self.depth_by_offset);
         let z_by_offset = z_by_d * offset_sigma;
-        let vz_by_offset =
-            (by_offset.x + moved.y * by_offset.y - moved.x * by_offset.z + vz_by_d) * offset_sigma;
+        let vz_by_offset = (depth_by_offset.x + moved.y * depth_by_offset.y - moved.x * depth_by_offset.z
+            + vz_by_d)
+            * offset_sigma;
         let cross = z_by_d * vz_by_d * var + z_by_offset * vz_by_offset;
         let cov = Matrix2::new(
             z_by_d * z_by_d * var + z_by_offset * z_by_offset,

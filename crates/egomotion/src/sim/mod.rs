@@ -8,7 +8,6 @@ mod depth_sensing;
 mod noise;
 mod render;
 mod scene;
-mod scene_file;
 mod sequences;
 mod shape;
 mod texture;
@@ -18,8 +17,8 @@ mod truth_maps;
 pub use depth_sensing::{DepthPrinciple, DepthSensing};
 pub use noise::{SensorError, SensorNoise};
 pub use render::{StereoImages, View};
-pub use scene::{Hit, Part, Scene};
-pub use scene_file::SceneError;
+pub use scene::{Hit, Part, Scene, SceneError};
+
 pub use sequences::{Sequence, paper_rig, reference_pose, twist_from_mm_deg};
 pub use shape::{Shape, Turn};
 pub use texture::Texture;

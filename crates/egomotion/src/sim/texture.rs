@@ -8,9 +8,9 @@ use rand_distr::{Distribution, UnitSphere};
 use rand_pcg::Pcg64Mcg;
 
 /// Shortest wavelength, in metres.
-pub(super) const SHORTEST_M: f64 = 0.015;
+const SHORTEST_M: f64 = 0.015;
 /// Longest wavelength, in metres.
-pub(super) const LONGEST_M: f64 = 0.9;
+const LONGEST_M: f64 = 0.9;
 
 /// Standard deviation of the pixel's Gaussian aperture (optics and sensor area together), in pixels.
 const APERTURE_PX: f64 = 0.5;
@@ -49,7 +49,7 @@ pub struct Texture {
 }
 
 impl Texture {
-    /// Waves of random directions and phases; wavelengths log-uniform from [`SHORTEST_M`] to [`LONGEST_M`].
+    /// Waves of random directions and phases; wavelengths log-uniform from 15 mm to 0.9 m.
     pub fn new(seed: u64) -> Self {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let mut waves =

@@ -40,8 +40,9 @@ const NEWTON_STEPS: usize = 12;
 /// Newton's step is taken unless it is this many times as long as Gauss–Newton's: far from the end the likelihood may
 /// be flat in some direction, and Newton's step too long.
 const LONGEST_NEWTON_STEP: f64 = 3.0;
-/// Steps are taken to shrink at least by this factor from one to the next, when their sum is foretold.
-const SLOWEST_SHRINKING: f64 = 0.5;
+/// The ratio of a step to the last is taken as at most this when the sum of those to come is foretold: a ratio near 1
+/// would foretell an endless way.
+const LARGEST_STEP_RATIO: f64 = 0.5;
 
 /// How maximum likelihood iterates and weighs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
@@ -57,7 +58,7 @@ pub struct MaximumLikelihoodOptions {
     pub start_observations: usize,
     /// Seed of the robust start.
     pub seed: u64,
-    /// Standard deviation of the phase error's amplitude, in pixels; see [`crate::estimate::SystematicResponse`].
+    /// Standard deviation of the phase error's amplitude, in pixels.
     pub phase_error_px: f64,
 }
 
@@ -225,7 +226,7 @@ impl Iterate {
             }
             let moved = delta.dot(&(step.score.information * delta)).max(0.0).sqrt();
             // Steps that shrink by a factor are followed by ones that sum up to this.
-            let factor = (moved / last).min(SLOWEST_SHRINKING);
+            let factor = (moved / last).min(LARGEST_STEP_RATIO);
             let rest = moved * factor / (1.0 - factor);
             last = moved;
             // The first step was one with structures as measured: where it ends depends on their noise.

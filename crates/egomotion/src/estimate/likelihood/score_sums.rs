@@ -17,7 +17,7 @@ const INLIER_Q: f64 = CHI2_3_P99;
 /// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
 const STRIP: usize = 512;
 
-/// FrameSums over observations, by φ.
+/// Sums over observations, by φ.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ScoreSums {
     /// Σ w Gᵀ S⁻¹ G and Σ w Gᵀ S⁻¹ e.
@@ -115,7 +115,7 @@ impl ScoreSums {
         self
     }
 
-    /// FrameSums by the small motion δ of a measurement as sums by φ.
+    /// Sums by the small motion δ of a measurement as sums by φ.
     fn by_phi(mut self, jacobian: &Matrix6<f64>) -> Self {
         let across = jacobian.transpose();
         self.score.information = across * self.score.information * jacobian;

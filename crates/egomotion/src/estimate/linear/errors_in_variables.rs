@@ -60,13 +60,13 @@ fn row_jacobian(change: &DepthChange, focal_px: f64) -> SMatrix<f64, 6, 3> {
     let [z, zx, zy, _] = change.depth.mean.into();
     // P = Z ray and a = (n, Z ray × n) with n = along − (0, 0, 1); `along` is in proportion to the gradient over Z.
     let ray = Vector3::new(x / f, y / f, 1.0);
-    let (by_zx, by_zy) = (Vector3::new(f, 0.0, -x) / z, Vector3::new(0.0, f, -y) / z);
-    let along = by_zx * zx + by_zy * zy;
+    let (n_by_zx, n_by_zy) = (Vector3::new(f, 0.0, -x) / z, Vector3::new(0.0, f, -y) / z);
+    let along = n_by_zx * zx + n_by_zy * zy;
     let column = |n: Vector3<f64>, m: Vector3<f64>| Vector6::new(n.x, n.y, n.z, m.x, m.y, m.z);
     SMatrix::from_columns(&[
         column(-along / z, -ray.cross(&Vector3::z())),
-        column(by_zx, ray.cross(&by_zx) * z),
-        column(by_zy, ray.cross(&by_zy) * z),
+        column(n_by_zx, ray.cross(&n_by_zx) * z),
+        column(n_by_zy, ray.cross(&n_by_zy) * z),
     ])
 }
 

@@ -4,7 +4,7 @@
 //! u ~ N(0, 1), (Σ w Yᵀ S⁻¹ Y + D diag(0, 1)) δ = Σ w Yᵀ S⁻¹ e − D (0, u). Observations near each other share their noise
 //! and say less than their number; D, by how much the scatter of the blocks' scores exceeds what independent rows
 //! would have, keeps them from overruling the prior (the adjustment of composite likelihoods). The covariance is the
-//! sandwich of [`crate::estimate::certainty::covariance`] with the errors eliminated from each block's score, and the prior's own part.
+//! sandwich of [`covariance`] with the errors eliminated from each block's score, and the prior's own part.
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use rayon::prelude::*;
@@ -72,7 +72,7 @@ struct Weighed {
     reweighting: f64,
 }
 
-/// AugmentedScore over the observations of a block, by φ's small motion and by the errors in their own units.
+/// Sums over the observations of a block, by φ's small motion and by the errors in their own units.
 #[derive(Debug, Clone, Copy)]
 struct AugmentedSums {
     information: SMatrix<f64, ALL, ALL>,
@@ -173,7 +173,7 @@ impl AugmentedSums {
         self.score += other.score;
     }
 
-    /// AugmentedScore by φ and by the errors in units of their prior standard deviations.
+    /// The sums by φ and by the errors in units of their prior standard deviations.
     fn score(&self, at: &LinearisationPoint<'_>, prior: &SensorPrior) -> AugmentedScore {
         let mut units = SMatrix::<f64, ALL, ALL>::identity();
         units.fixed_view_mut::<6, 6>(0, 0).copy_from(&StereoTrack::small_motion_jacobian(at));
@@ -188,7 +188,7 @@ impl AugmentedSums {
     }
 }
 
-/// AugmentedScore over the observations of a block, by all unknowns.
+/// Sums over the observations of a block, by all unknowns.
 #[derive(Debug, Clone, Copy)]
 struct AugmentedScore {
     score: BlockScore<ALL>,

@@ -197,9 +197,11 @@ fn measured_velocity(pair: &DensePair<'_>, by: PixelVelocity, u: usize, v: usize
     match by {
         PixelVelocity::DepthTrack => Some(depth_velocity::dcce(&pair.depth_track(u, v)?.depth_change(bf))),
         PixelVelocity::DepthFlow => {
-            Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)).from_middle())
+            Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)).at_interval_start())
         }
-        PixelVelocity::StereoFlow => Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf).from_middle()),
+        PixelVelocity::StereoFlow => {
+            Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf).at_interval_start())
+        }
         PixelVelocity::Disparities | PixelVelocity::RigidScene => {
             Some(DepthVelocity::from_disparities(&pair.disparities(u, v)?, bf))
         }

@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::scene::{MAX_PARTS, Part, Scene};
+use super::{MAX_PARTS, Part, Scene};
 
 /// The numbers that make a [`Scene`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

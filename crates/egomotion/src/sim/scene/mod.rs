@@ -3,12 +3,15 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::scene_file::SceneFile;
+mod file;
+
 use super::shape::Shape;
 use super::texture::Texture;
+pub use file::SceneError;
+use file::SceneFile;
 
 /// The most parts of a scene: a surface id has 16 bits.
-pub(super) const MAX_PARTS: usize = 10_000;
+const MAX_PARTS: usize = 10_000;
 /// Number of surface ids that a part takes: a box has six faces.
 const FACES: u16 = 6;
 /// Where the texture saturates, in its standard deviations: it keeps every grey level above zero.
