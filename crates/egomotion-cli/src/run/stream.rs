@@ -43,7 +43,11 @@ pub fn run(plan: &RunPlan, input: &StreamInput) -> Result<Ending> {
         // Progress would stand between the lines of whoever looks at both.
         progress: frames_bar(0, true),
     };
-    let frames = PipedFrames { unread: Mutex::new((Some(first), pairs)), rectifier, rate_hz: input.rate_hz };
+    let frames = PipedFrames {
+        unread: Mutex::new(Unread { first: Some(first), pairs }),
+        rectifier,
+        rate_hz: input.rate_hz,
+    };
     let outcome = session.run(
         None,
         &stop_signal("frame"),
@@ -86,10 +90,16 @@ fn write_results(
 
 /// Frames as they are piped in, one after the other.
 struct PipedFrames {
-    /// The first pair, which was read to know its size, and those after it.
-    unread: Mutex<(Option<(Image, Image)>, ImagePairs<Stdin>)>,
+    unread: Mutex<Unread>,
     rectifier: Option<Rectifier>,
     rate_hz: f64,
+}
+
+/// Images that no frame has taken yet.
+struct Unread {
+    /// The first pair, which was read before the others to know its size.
+    first: Option<(Image, Image)>,
+    pairs: ImagePairs<Stdin>,
 }
 
 impl PipedFrames {
@@ -113,10 +123,9 @@ impl PipedFrames {
     fn next_images(&self) -> Result<Option<(Image, Image)>, IoError> {
         // A poisoned lock means that the reading thread has failed: the stream ends.
         let Ok(mut unread) = self.unread.lock() else { return Ok(None) };
-        let (first, pairs) = &mut *unread;
-        match first.take() {
+        match unread.first.take() {
             Some(first) => Ok(Some(first)),
-            None => pairs.next(),
+            None => unread.pairs.next(),
         }
     }
 

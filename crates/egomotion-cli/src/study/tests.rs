@@ -112,7 +112,7 @@ fn run(study: &Pendulum, out: &Path, resume: bool) -> anyhow::Result<Ending> {
 }
 
 fn refusal(study: &Pendulum, out: &Path, resume: bool) -> String {
-    let error = run(study, out, resume).err().expect("it is refused");
+    let error = run(study, out, resume).expect_err("it is refused");
     let text = format!("{error:#}");
     assert!(!text.contains('\n'), "{text}");
     text
