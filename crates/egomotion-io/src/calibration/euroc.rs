@@ -50,7 +50,7 @@ pub(super) fn camera(root: &Entry<'_>) -> Result<(CameraModel, RigidMotion), IoE
     Ok((model, root.get(&["T_BS"])?.motion()?))
 }
 
-/// Write one camera and its pose, such that [`read()`] gives them back.
+/// Write one camera and its pose, such that reading gives them back.
 ///
 /// # Errors
 /// The file cannot be written, or the format has no name for the distortion.

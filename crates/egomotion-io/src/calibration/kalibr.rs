@@ -50,7 +50,7 @@ fn camera(cam: &Entry<'_>) -> Result<CameraModel, IoError> {
     Ok(CameraModel { focal_px: (fx, fy), centre_px: (cx, cy), distortion: lens, size })
 }
 
-/// Write a pair, such that [`read()`] gives it back.
+/// Write a pair, such that reading gives it back.
 ///
 /// # Errors
 /// The file cannot be written, or the format has no name for the distortion.

@@ -2,7 +2,7 @@
 //!
 //! A corner of the left image is located in the right image of its time, in the left image of the
 //! next frame and from there in the right one, and back again (the four-way check). Each of the
-//! four images localises the corner with its own independent noise ([`Localisation`]), from which
+//! four images localises the corner with its own independent noise (`Localisation`), from which
 //! the covariance of (x, y, d) at either end follows.
 //!
 //! Where a corner was found, with its disparity, is where the next pair follows it from: it lives
