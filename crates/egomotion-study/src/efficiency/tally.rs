@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use egomotion::estimate::MotionEstimate;
 use egomotion::geometry::{Gaussian, Twist};
 
-/// ComponentSums of one component.
+/// Sums over the draws of one component of φ.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 struct ComponentSums {
     /// Σ (u − z).
