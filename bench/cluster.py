@@ -95,7 +95,7 @@ def main(data):
 
 
 def measure(bench, kitti):
-    egomotion.simulate("C", bench.folder / "C", frames=30, size=(320, 240))
+    egomotion.simulate("C", bench.folder / "C", frames=30, size_px=(320, 240))
     cases = [
         ("KITTI 06, sparse", bench.recordings("kitti", kitti), {"observe": "sparse"}),
         ("KITTI 06, dense", bench.folder / "kitti", {"frames": 26}),
