@@ -55,7 +55,7 @@
 //!
 //! # Build with optimisation
 //!
-//! Without optimisation images take many times longer. Build with `--release`, or say in your workspace's `Cargo.toml`:
+//! Without optimisation images take long. Build with `--release`, or say in your workspace's `Cargo.toml`:
 //!
 //! ```toml
 //! [profile.dev.package."*"]

@@ -2,7 +2,7 @@
 
 use super::report::{FrameRow, Report};
 
-/// Most points of a curve: several a pixel of the widest chart. Of a longer run every so-many-th row is drawn.
+/// Most points of a curve: several a pixel of the widest chart. Longer runs show every n-th row.
 const MAX_POINTS: usize = 1500;
 
 /// The rows that are drawn, and what all charts over time mark.
