@@ -2,11 +2,11 @@
 
 mod scattered;
 
-use egomotion::constrain::{LinearConstraint, binocular_flow, dcce, image_flow};
+use egomotion::constrain::{LinearConstraint, binocular_flow, dcce, displacement, image_flow};
 use egomotion::estimate::{
     LikelihoodTerm, Row, StudentT, Weighting, least_squares, m_estimate, maximum_likelihood,
 };
-use egomotion::geometry::{Gaussian, RigidMotion, Twist};
+use egomotion::geometry::{CayleyMotion, Gaussian, RigidMotion, Twist};
 use egomotion::motion::{DepthVelocity, DisparityOffset, RigidPrediction, depth_velocity as vz};
 use egomotion::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector4, Vector6};
@@ -231,6 +231,31 @@ fn sigma_of_every_constraint() {
                 let pixels =
                     |m: &Vector4<f64>| image_flow::constraints(&with_measured(&flow, m), &rig, &at)[i];
                 check_sigma(pixels, &flow.measured, &at, 1e-2);
+            }
+        }
+    }
+}
+
+/// Rows of finite displacements: their unknowns are (τ, w), in the places of (t, Ω).
+#[test]
+fn sigma_of_displacements() {
+    let (rig, mut rng) = (rig(), random(26));
+    for scale in [0.0, 1.0, -3.0] {
+        let at = CayleyMotion::from_twist(&phi().scaled(scale));
+        let unknowns = Twist { t: at.tau, omega: at.w };
+        for _ in 0..10 {
+            let track = stereo_track(&mut rng);
+            let ends: Gaussian<6> = joined(&track.before, &track.after);
+            let rows = |track: &StereoTrack| {
+                let found = displacement::constraints(track, &rig, &at).unwrap();
+                [found.image[0], found.image[1], found.depth]
+            };
+            for (i, got) in rows(&track).into_iter().enumerate() {
+                let residual = |m: &Vector6<f64>| {
+                    SVector::<f64, 1>::new(rows(&with_ends(&track, m))[i].residual(&unknowns))
+                };
+                let want = propagated(residual, &ends, 1e-2)[0].sqrt();
+                assert!((got.sigma - want).abs() <= EXACT * want, "{i}: {} {want}", got.sigma);
             }
         }
     }

@@ -10,10 +10,12 @@ use anyhow::Result;
 use egomotion::pipeline::Observe;
 use egomotion_study::consistency::{DepthKind, RenderedSensor};
 use egomotion_study::synthetic::MeasurementModel;
-use egomotion_study::{Assumptions, Consistency, Efficiency, LabStudy, OneSetting, Sensitivity, Uncertainty};
+use egomotion_study::{
+    Assumptions, Consistency, Efficiency, LabStudy, OneSetting, Reliability, Sensitivity, Uncertainty,
+};
 
 use crate::args::study::{
-    ConsistencyArgs, EfficiencyArgs, LaboratoryArgs, PairSensorArg, StudyCommand, TableArgs,
+    ConsistencyArgs, EfficiencyArgs, LaboratoryArgs, PairSensorArg, ReliabilityArgs, StudyCommand, TableArgs,
 };
 use crate::exit::Ending;
 use crate::process::set_threads;
@@ -36,6 +38,7 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
         StudyCommand::Assumptions(args) => alone(args, &Assumptions { seed: args.seed }),
         StudyCommand::Consistency(args) => alone(&args.laboratory, &consistency(args)),
         StudyCommand::Efficiency(args) => alone(&args.laboratory, &efficiency(args)),
+        StudyCommand::Reliability(args) => alone(&args.laboratory, &reliability(args)),
         StudyCommand::All(args) => {
             let mut laboratory = open(args, None, Some("The paper's studies, repeated"))?;
             // Its draws are of another kind and number.
@@ -89,6 +92,17 @@ fn consistency(args: &ConsistencyArgs) -> Consistency {
             PairSensorArg::Rendered => RenderedSensor::Depth(DepthKind::Rendered),
         },
         observe: if args.sparse { Observe::Sparse } else { Observe::Dense },
+        pairs: args.laboratory.draws.unwrap_or(own.pairs),
+        seed: args.laboratory.seed,
+    }
+}
+
+fn reliability(args: &ReliabilityArgs) -> Reliability {
+    let own = Reliability::default();
+    Reliability {
+        sequences: args.sequences.clone().unwrap_or(own.sequences),
+        width_px: args.size.0,
+        height_px: args.size.1,
         pairs: args.laboratory.draws.unwrap_or(own.pairs),
         seed: args.laboratory.seed,
     }

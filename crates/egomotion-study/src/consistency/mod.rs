@@ -7,7 +7,7 @@
 mod coverage;
 mod depth_camera;
 mod figures;
-mod pair;
+pub(crate) mod pair;
 mod statistics;
 mod tables;
 

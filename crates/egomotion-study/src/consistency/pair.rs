@@ -34,7 +34,7 @@ const NAME_HASH_FACTOR: u64 = 131;
 const SEED_FACTOR: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// A pair of frames with a pose, a texture and a noise of its own.
-pub(super) struct RandomPair<'a> {
+pub(crate) struct RandomPair<'a> {
     sequence: &'a Sequence,
     scene: Scene,
     number: usize,
@@ -45,7 +45,7 @@ pub(super) struct RandomPair<'a> {
 
 impl<'a> RandomPair<'a> {
     /// The pair of that number; everything random in it follows from the number and the seed.
-    pub(super) fn new(sequence: &'a Sequence, number: usize, seed: u64) -> Self {
+    pub(crate) fn new(sequence: &'a Sequence, number: usize, seed: u64) -> Self {
         let name =
             sequence.name.bytes().fold(0_u64, |h, b| h.wrapping_mul(NAME_HASH_FACTOR).wrapping_add(b.into()));
         let seed = seed.wrapping_mul(SEED_FACTOR) ^ draw_seed(name, number);
@@ -66,7 +66,8 @@ impl<'a> RandomPair<'a> {
         Self { sequence, scene, number, seed: seed >> 1, phi, poses }
     }
 
-    fn view(&self, k: usize) -> View<'_> {
+    /// What the rig sees at the first or the second moment.
+    pub(crate) fn view(&self, k: usize) -> View<'_> {
         View::new(&self.scene, &self.sequence.rig, self.poses[k])
     }
 
@@ -78,10 +79,16 @@ impl<'a> RandomPair<'a> {
         Ok(motion.push(self.frame(1)))
     }
 
-    fn frame(&self, k: usize) -> StereoFrame {
+    /// The images of the first or the second moment, with the sensor's noise.
+    pub(crate) fn frame(&self, k: usize) -> StereoFrame {
         let noise = SensorNoise::default().with_seed(self.seed);
         let seen = noise.expose(&self.view(k).render(EDGE_RAYS), k as u64);
         StereoFrame { time_s: self.sequence.interval_s * k as f64, left: seen.left, right: seen.right }
+    }
+
+    /// φ of the left camera.
+    pub(crate) fn phi(&self) -> Twist {
+        self.phi.seen_from(&self.sequence.rig.left_from_cyclopean())
     }
 
     /// Run the pipeline and set its answer against the truth.
@@ -96,7 +103,7 @@ impl<'a> RandomPair<'a> {
             RenderedSensor::Depth(kind) => ErringDepthCamera::new(kind, &self.scene, &rig, self.seed)
                 .answer(self.poses[0], &self.phi, observe)?,
         };
-        let phi = self.phi.seen_from(&rig.left_from_cyclopean());
+        let phi = self.phi();
         let mut record = ConsistencyRecord {
             sequence: self.sequence.name.clone(),
             pair: self.number,

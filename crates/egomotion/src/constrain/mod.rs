@@ -2,6 +2,7 @@
 
 pub mod binocular_flow;
 pub mod dcce;
+pub mod displacement;
 pub mod image_flow;
 mod linear;
 mod misclosure;

@@ -1,13 +1,16 @@
 //! The answer of every estimator: θ̂ with its covariance, and which of it was observed.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix6, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::certainty::covariance::with_unobserved;
 use super::certainty::undetermined::UndeterminedDirections;
 use super::serde_array;
 use super::unsolvable::Unsolvable;
-use crate::geometry::{Gaussian, Twist};
+use crate::geometry::{CayleyMotion, Gaussian, Twist};
+
+/// An unknown is as free as another of which it takes this share: less is of second order in a motion, beside its size.
+const LEAST_PART: f64 = 1e-3;
 
 /// The answer of an estimator of N unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -71,8 +74,33 @@ impl MotionEstimate {
     /// The same motion and covariance seen by a parallel camera centred at `centre`, equation (4).
     pub fn seen_from(&self, centre: &Vector3<f64>) -> Self {
         let matrix = Twist::seen_from_matrix(centre);
-        let theta = self.theta.propagate(matrix * self.theta.mean, &matrix);
-        Self { theta, undetermined: self.undetermined.transformed(&matrix), ..*self }
+        self.transformed(matrix * self.theta.mean, &matrix)
+    }
+
+    /// φ where the unknowns were (τ, w) of [`CayleyMotion`].
+    pub(crate) fn from_cayley(self) -> Self {
+        let cayley = CayleyMotion::from_vector(&self.theta.mean);
+        self.transformed(cayley.twist().vector(), &cayley.twist_jacobian())
+    }
+
+    /// The estimate of other unknowns, of value `mean` and derivative `jacobian` by these.
+    ///
+    /// An unknown that takes more than [`LEAST_PART`] of one that is not observed is not observed either.
+    fn transformed(&self, mean: Vector6<f64>, jacobian: &Matrix6<f64>) -> Self {
+        let free = |i: usize| (0..6).any(|j| !self.observed[j] && jacobian[(i, j)].abs() > LEAST_PART);
+        let observed: [bool; 6] = std::array::from_fn(|i| !free(i));
+        let finite = Matrix6::from_fn(|i, j| {
+            let known = self.observed[i] && self.observed[j];
+            if known { self.theta.cov[(i, j)] } else { 0.0 }
+        });
+        let known = Gaussian { mean: self.theta.mean, cov: finite }.propagate(mean, jacobian);
+        let mean = Vector6::from_fn(|i, _| if observed[i] { known.mean[i] } else { 0.0 });
+        Self {
+            theta: Gaussian { mean, cov: with_unobserved(known.cov, &observed) },
+            observed,
+            undetermined: self.undetermined.transformed(jacobian),
+            ..*self
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 //! The module imports nothing from the rest of the crate.
 
 mod camera;
+mod cayley;
 mod distortion;
 pub mod distribution;
 pub(crate) mod gaussian;
@@ -15,6 +16,7 @@ mod rig;
 mod twist;
 
 pub use camera::{Camera, CameraError};
+pub use cayley::CayleyMotion;
 pub use distortion::Distortion;
 pub use gaussian::{Gaussian, rounding_variance};
 pub use grid::{Field, Grid, Image};

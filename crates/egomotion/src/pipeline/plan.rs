@@ -18,8 +18,12 @@ pub enum Equations {
     DepthChange,
     /// Binocular flow in two steps, (14) then (3).
     BinocularFlow,
+    /// The same of finite displacements, exact in the mean point.
+    BinocularDisplacement,
     /// Binocular flow and image flow solved together.
     JointFlow,
+    /// The same of finite displacements, exact in the mean point.
+    JointDisplacement,
     /// Point pairs, (22).
     Alignment(Form),
 }
@@ -68,9 +72,12 @@ impl Plan {
             (Method::Ml, Approach::Differential) => (Equations::FlowLikelihood, PixelVelocity::RigidScene),
             (Method::Dcce, Approach::Discrete) => (Equations::DepthChange, PixelVelocity::DepthTrack),
             (Method::Dcce, Approach::Differential) => (Equations::DepthChange, PixelVelocity::DepthFlow),
-            (Method::Dv, Approach::Discrete) => (Equations::BinocularFlow, PixelVelocity::Disparities),
+            (Method::Dv, Approach::Discrete) => {
+                (Equations::BinocularDisplacement, PixelVelocity::Disparities)
+            }
             (Method::Dv, Approach::Differential) => (Equations::BinocularFlow, PixelVelocity::StereoFlow),
-            (Method::Joint, _) => (Equations::JointFlow, PixelVelocity::RigidScene),
+            (Method::Joint, Approach::Discrete) => (Equations::JointDisplacement, PixelVelocity::RigidScene),
+            (Method::Joint, Approach::Differential) => (Equations::JointFlow, PixelVelocity::RigidScene),
             (Method::Rigid, _) => (Equations::Alignment(Form::Rigid), PixelVelocity::RigidScene),
             (Method::Linear22, _) => (Equations::Alignment(Form::Affine), PixelVelocity::RigidScene),
         };

@@ -3,6 +3,7 @@
 mod consistency;
 mod efficiency;
 mod real;
+mod reliability;
 mod sensitivity;
 mod table;
 
@@ -14,6 +15,7 @@ use super::values::positive;
 pub use consistency::{ConsistencyArgs, PairSensorArg};
 pub use efficiency::EfficiencyArgs;
 pub use real::RealArgs;
+pub use reliability::ReliabilityArgs;
 pub use sensitivity::SensitivityArgs;
 pub use table::TableArgs;
 
@@ -38,6 +40,8 @@ pub enum StudyCommand {
     /// Variance over the Cramér–Rao bound, bias, NEES and coverage of every method, over noise, number of points and
     /// outliers; what is reported observed where something is missing.
     Efficiency(EfficiencyArgs),
+    /// Which answers of the linear methods can be believed: answered, refused, warned of, and wrong without a word.
+    Reliability(ReliabilityArgs),
     /// Every study, with one page that links them.
     All(LaboratoryArgs),
 }

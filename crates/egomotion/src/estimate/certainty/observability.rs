@@ -102,6 +102,21 @@ impl Observability {
         Ok(found)
     }
 
+    /// The same with directions as undetermined whose information does not exceed `least` of them.
+    ///
+    /// # Errors
+    /// [`Unsolvable::Unobservable`] when no direction is left.
+    pub(crate) fn exceeding<const N: usize>(
+        mut self,
+        least: impl Fn(&SVector<f64, N>) -> f64,
+    ) -> Result<Self, Unsolvable> {
+        for k in 0..N {
+            let direction = SVector::from_fn(|i, _| self.eigenvectors[(i, k)] * self.scale[i]);
+            self.floors[k] = self.floors[k].max(least(&direction));
+        }
+        if self.rank() > 0 { Ok(self) } else { Err(Unsolvable::Unobservable) }
+    }
+
     fn determined(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.eigenvalues.len()).filter(|&k| self.eigenvalues[k] > self.floors[k])
     }

@@ -8,7 +8,7 @@
 //! residuals have them (the mixture of a t and outliers).
 
 use documented::DocumentedFields;
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::mixture::ResidualModel;
@@ -43,6 +43,16 @@ const LONGEST_NEWTON_STEP: f64 = 3.0;
 /// The ratio of a step to the last is taken as at most this when the sum of those to come is foretold: a ratio near 1
 /// would foretell an endless way.
 const LARGEST_STEP_RATIO: f64 = 0.5;
+
+/// A step is taken back when the cost per observation rises by more than this: structures, which lag a step behind
+/// φ, change it by less.
+const COST_SLACK: f64 = 3e-3;
+/// The first damping after a step by which the likelihood fell, as a share of the information's diagonal.
+const LEAST_DAMPING: f64 = 0.1;
+/// Damping grows no further than this: steps are then a thousandth of Gauss–Newton's.
+const MOST_DAMPING: f64 = 1e3;
+/// Damping grows by this factor with each step that is taken back, and falls by it with each that is not.
+const DAMPING_GROWTH: f64 = 10.0;
 
 /// How maximum likelihood iterates and weighs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
@@ -139,7 +149,7 @@ pub fn maximum_likelihood<M: LikelihoodTerm>(
             median_square(&found.motion.phi(), &few, rig)
                 > ASTRAY_MEDIAN_RATIO * median_square(start, &few, rig)
         }
-        Err(why) => *why == Unsolvable::NotConverged,
+        Err(why) => matches!(why, Unsolvable::NotConverged | Unsolvable::FewRows { .. }),
     };
     if astray {
         return maximise(observations, &few, rig, start, blocks, &StudentT { fitted: false, ..*kernel });
@@ -200,6 +210,8 @@ impl Iterate {
     }
 
     /// Iterate until φ moves by less than the tolerance; with the sums of the last step.
+    ///
+    /// The likelihood must not fall: a step by which it does is taken back and damped (Levenberg and Marquardt).
     fn settle<M: LikelihoodTerm>(
         mut self,
         observations: &[M],
@@ -208,17 +220,31 @@ impl Iterate {
         kernel: &StudentT,
     ) -> Result<(Self, FrameSums), Unsolvable> {
         let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
-        let mut last = 0.0;
+        let (mut damping, mut last_moved) = (0.0, 0.0);
+        let mut accepted: Option<Accepted> = None;
         for iteration in 0..kernel.iterations {
             let at = LinearisationPoint::new(self.phi, rig);
             let weighing = Weighing { blocks, residuals: self.residuals };
             let sums = FrameSums::linearised(observations, &mut structures, &at, &weighing);
+            let cost = sums.whole.cost(self.residuals.scale2);
+            if let Some(best) = accepted.as_ref().filter(|best| best.falls_to(cost, sums.whole.used)) {
+                damping = (damping * DAMPING_GROWTH).clamp(LEAST_DAMPING, MOST_DAMPING);
+                self.phi = best.stepped(&direction(&best.sums.whole, false, damping)?);
+                structures
+                    .iter_mut()
+                    .zip(observations)
+                    .for_each(|(s, observation)| *s = observation.structure());
+                last_moved = 0.0;
+                continue;
+            }
+            damping = if damping > LEAST_DAMPING { damping / DAMPING_GROWTH } else { 0.0 };
             let step = &sums.whole;
             if step.used < 3 {
                 return Err(Unsolvable::FewRows { rows: step.used, needed: 3 });
             }
-            let delta = direction(step, iteration < NEWTON_STEPS)?;
-            self.phi = Twist::from_vector(&(self.phi.vector() + delta));
+            let delta = direction(step, iteration < NEWTON_STEPS, damping)?;
+            let from = self.phi;
+            self.phi = Twist::from_vector(&(from.vector() + delta));
             // Beside outliers a scale that follows the weights, which follow the scale, may shrink to nothing: it stays
             // as it was found (the MM-estimator of Yohai 1987).
             if kernel.nu.is_finite() && !self.residuals.mixture.has_outliers() {
@@ -226,21 +252,47 @@ impl Iterate {
             }
             let moved = delta.dot(&(step.score.information * delta)).max(0.0).sqrt();
             // Steps that shrink by a factor are followed by ones that sum up to this.
-            let factor = (moved / last).min(LARGEST_STEP_RATIO);
+            let factor = (moved / last_moved).min(LARGEST_STEP_RATIO);
             let rest = moved * factor / (1.0 - factor);
-            last = moved;
+            last_moved = moved;
             // The first step was one with structures as measured: where it ends depends on their noise.
-            if iteration > 0 && rest <= kernel.tolerance * self.residuals.scale2.sqrt() {
+            if iteration > 0 && damping == 0.0 && rest <= kernel.tolerance * self.residuals.scale2.sqrt() {
                 return Ok((self, sums));
             }
+            accepted = Some(Accepted { phi: from, cost, sums });
         }
         Err(Unsolvable::NotConverged)
     }
 }
 
+/// The last φ from which the likelihood did not fall, with its sums.
+struct Accepted {
+    phi: Twist,
+    cost: f64,
+    sums: FrameSums,
+}
+
+impl Accepted {
+    /// Whether the likelihood falls from here to a place of this cost.
+    fn falls_to(&self, cost: f64, used: usize) -> bool {
+        // NaN is no rise either.
+        !(cost <= self.cost + COST_SLACK * used as f64)
+    }
+
+    fn stepped(&self, delta: &Vector6<f64>) -> Twist {
+        Twist::from_vector(&(self.phi.vector() + delta))
+    }
+}
+
 /// The step of φ: Newton's, with the weights' own change, near the end; Gauss–Newton's elsewhere.
-fn direction(step: &ScoreSums, newton: bool) -> Result<Vector6<f64>, Unsolvable> {
+///
+/// `damping` adds that share of its own diagonal to the information.
+fn direction(step: &ScoreSums, newton: bool, damping: f64) -> Result<Vector6<f64>, Unsolvable> {
     let (information, score) = (&step.score.information, &step.score.score);
+    if damping > 0.0 {
+        let damped = information + Matrix6::from_diagonal(&(information.diagonal() * damping));
+        return Observability::of(&damped)?.solve(&damped, score);
+    }
     let observability = Observability::of(information)?;
     let plain = observability.solve(information, score)?;
     if observability.rank() < 6 || !newton {

@@ -74,6 +74,19 @@ impl Mixture {
         (student * inlier, 2.0 * (1.0 / distance + falling * (1.0 - inlier)))
     }
 
+    /// −2 ln of the density at a squared length `q`, beside a constant: what the weights make least.
+    #[inline(always)]
+    pub(crate) fn cost(&self, q: f64) -> f64 {
+        if self.nu.is_infinite() {
+            return q;
+        }
+        let x = 1.0 + q / self.nu;
+        if self.odds == 0.0 {
+            return (self.nu + DIMENSION) * x.ln();
+        }
+        -2.0 * (x.powi(-self.exponent) + self.odds * scale_free(q)).ln()
+    }
+
     /// Whether outliers have a share: then far residuals have no weight at all.
     pub(crate) fn has_outliers(&self) -> bool {
         self.odds > 0.0
@@ -257,6 +270,20 @@ mod tests {
                     (numeric - slope).abs() < 1e-6 * slope.max(1.0),
                     "{mixture:?} {q}: {numeric} {slope}"
                 );
+            }
+        }
+        // The weight is the cost's slope.
+        for mixture in [
+            Mixture::student(&StudentT { nu: 4.0, ..StudentT::default() }),
+            Mixture { nu: 97.0, exponent: 50, odds: 1e-5 },
+        ] {
+            for q in [0.1, 3.0, 22.0, 60.0] {
+                let numeric = (mixture.cost(q + 1e-5) - mixture.cost(q - 1e-5)) / 2e-5;
+                // Outliers' own density falls too, but tells nothing of the motion.
+                let outlier = (1.0 - (if mixture.odds > 0.0 { mixture.inlier(q) } else { 1.0 })) * DIMENSION
+                    / (OUTLIER_CORE_Q + q);
+                let weight = mixture.weight(q).0;
+                assert!((numeric - outlier - weight).abs() < 1e-6, "{mixture:?} {q}: {numeric} {weight}");
             }
         }
         // However far, there is no overflow into something that is not a number.

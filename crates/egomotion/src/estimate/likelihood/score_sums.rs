@@ -14,6 +14,9 @@ use crate::simd::vectorised;
 
 /// Squared misclosure, in units of its scaled covariance, beyond which an observation is no inlier.
 const INLIER_Q: f64 = CHI2_3_P99;
+/// Squared misclosure, in units of its scaled covariance, that counts for a point which a motion leads behind the camera:
+/// no motion gains by losing points.
+const UNUSABLE_Q: f64 = 1e6;
 /// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
 const STRIP: usize = 512;
 
@@ -36,6 +39,8 @@ pub struct ScoreSums {
     falling_off: f64,
     /// Σ q.
     pub(crate) square: f64,
+    /// Σ of the residual model's cost, and of [`UNUSABLE_Q`] for each observation that is not in front of the camera.
+    cost: f64,
     /// Number of observations in front of the camera.
     pub(crate) used: usize,
     /// Number of observations that fit.
@@ -63,6 +68,11 @@ impl ScoreSums {
     /// number makes few iterations of many (PX-EM: Liu, Rubin and Wu 1998).
     pub(crate) fn scale2(&self) -> f64 {
         self.weighted_square / (3.0 * self.weights)
+    }
+
+    /// −2 ln of the likelihood at the linearisation, beside a constant, of misclosures of the given squared scale.
+    pub(crate) fn cost(&self, scale2: f64) -> f64 {
+        self.cost + 3.0 * self.used as f64 * scale2.ln()
     }
 
     /// Factor from the inverse of Σ w Gᵀ S⁻¹ G to the covariance, where residuals are independent and spherical.
@@ -96,6 +106,7 @@ impl ScoreSums {
         self.score_square += weight * weight * q;
         self.falling_off += change * q;
         self.square += q;
+        self.cost += mixture.cost(q / scale2);
         self.used += 1;
         self.inliers += usize::from(q <= INLIER_Q * scale2);
     }
@@ -110,6 +121,7 @@ impl ScoreSums {
         self.score_square += other.score_square;
         self.falling_off += other.falling_off;
         self.square += other.square;
+        self.cost += other.cost;
         self.used += other.used;
         self.inliers += other.inliers;
         self
@@ -223,8 +235,9 @@ fn strip<M: Measurement>(
             }
             run = (block, ScoreSums::default());
         }
-        if let Some(l) = observation.linearise(structure, at) {
-            run.1.add(&l, weighing);
+        match observation.linearise(structure, at) {
+            Some(l) => run.1.add(&l, weighing),
+            None => run.1.cost += weighing.residuals.mixture.cost(UNUSABLE_Q),
         }
     }
     runs.push(run);

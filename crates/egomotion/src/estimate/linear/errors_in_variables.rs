@@ -14,9 +14,10 @@
 //! Noise alone fills the plain normal equations up to full rank. A direction is determined only where what the correction
 //! leaves exceeds its own scatter over the blocks.
 
-use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix6, SMatrix, Vector6};
 use rayon::prelude::*;
 
+use super::fit::{DETERMINED_SIGMAS, NOISE_VARIANCE};
 use crate::constrain::dcce;
 use crate::estimate::certainty::blocks::{BlockScore, Blocks};
 use crate::estimate::certainty::covariance::covariance;
@@ -33,12 +34,6 @@ const OUTLIER_SIGMAS: f64 = 4.0;
 const MOST_ITERATIONS: usize = 20;
 /// The iteration ends when at most one row in this many changes sides: the answer then moves by less than its noise.
 const ROWS_PER_CHANGE: usize = 10_000;
-/// A direction is determined whose information exceeds this many standard errors of what the correction takes away:
-/// more would call weak directions unobserved, less would let noise pass for information.
-const DETERMINED_SIGMAS: f64 = 2.5;
-/// Variance of what the correction leaves along an undetermined direction, in units of the squared noise: 2 of a
-/// normal number's square, and half as much again since rows two pixels apart share a pixel.
-const CORRECTION_VARIANCE: f64 = 3.0;
 /// Rows summed by one task; fixed, so that sums do not depend on the number of threads.
 const STRIP: usize = 4096;
 
@@ -54,22 +49,6 @@ struct NoisyRow {
     block: usize,
 }
 
-/// ∂a/∂(Z, Zx, Zy) of the row a of (11), 6×3; b is −Zt.
-fn row_jacobian(change: &DepthChange, focal_px: f64) -> SMatrix<f64, 6, 3> {
-    let (x, y, f) = (change.x_px, change.y_px, focal_px);
-    let [z, zx, zy, _] = change.depth.mean.into();
-    // P = Z ray and a = (n, Z ray × n) with n = along − (0, 0, 1); `along` is in proportion to the gradient over Z.
-    let ray = Vector3::new(x / f, y / f, 1.0);
-    let (n_by_zx, n_by_zy) = (Vector3::new(f, 0.0, -x) / z, Vector3::new(0.0, f, -y) / z);
-    let along = n_by_zx * zx + n_by_zy * zy;
-    let column = |n: Vector3<f64>, m: Vector3<f64>| Vector6::new(n.x, n.y, n.z, m.x, m.y, m.z);
-    SMatrix::from_columns(&[
-        column(-along / z, -ray.cross(&Vector3::z())),
-        column(n_by_zx, ray.cross(&n_by_zx) * z),
-        column(n_by_zy, ray.cross(&n_by_zy) * z),
-    ])
-}
-
 impl NoisyRow {
     /// `None` where a number is not finite.
     fn of(change: &DepthChange, focal_px: f64, blocks: &Blocks) -> Option<Self> {
@@ -77,10 +56,7 @@ impl NoisyRow {
         let per_disparity = change.depth.mean[0].powi(-2);
         let constraint = dcce::constraint(change, focal_px, &Twist::zero()).scaled(per_disparity);
         let (a, b) = (constraint.row(), constraint.rate);
-        let mut jacobian = SMatrix::<f64, 7, 4>::zeros();
-        jacobian.fixed_view_mut::<6, 3>(0, 0).copy_from(&row_jacobian(change, focal_px));
-        jacobian[(6, 3)] = -1.0;
-        let noise = jacobian * change.depth.cov * jacobian.transpose() * (per_disparity * per_disparity);
+        let noise = dcce::row_noise(change, focal_px) * (per_disparity * per_disparity);
         let finite = a.iter().chain(noise.iter()).all(|v| v.is_finite()) && b.is_finite();
         finite.then(|| Self { a, b, noise, block: blocks.index(change.x_px, change.y_px) })
     }
@@ -206,12 +182,12 @@ fn sums(rows: &[NoisyRow], phi: &Vector6<f64>, blocks: &Blocks) -> Vec<Corrected
 /// Eigen-analysis of the corrected information, tested against the scatter of its correction.
 ///
 /// Along a direction that is not determined a row adds the square of a normal number less its variance v, which
-/// scatters by [`CORRECTION_VARIANCE`] v².
+/// scatters by [`NOISE_VARIANCE`] v².
 fn determined(by_block: &[CorrectedSums], whole: &CorrectedSums) -> Result<Observability, Unsolvable> {
     Observability::beyond_noise(&whole.information, &whole.noise, |direction: &Vector6<f64>| {
         let scatter = |sums: &CorrectedSums| {
             let noise = direction.dot(&(sums.noise * direction));
-            CORRECTION_VARIANCE * noise * noise / sums.used.max(1) as f64
+            NOISE_VARIANCE * noise * noise / sums.used.max(1) as f64
         };
         DETERMINED_SIGMAS * by_block.iter().map(scatter).sum::<f64>().sqrt()
     })
@@ -239,29 +215,5 @@ fn estimate(
         rows,
         inliers: whole.used,
         residual_scale: (whole.square / whole.variance.max(f64::MIN_POSITIVE)).sqrt(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::{Matrix4, Vector4};
-
-    use super::*;
-
-    #[test]
-    fn the_noise_of_a_row_is_by_its_numeric_jacobian() {
-        let change = |depth: Vector4<f64>| DepthChange {
-            x_px: 40.0,
-            y_px: -31.0,
-            depth: Gaussian { mean: depth, cov: Matrix4::identity() },
-            flow: Gaussian::independent([0.0; 2], [1.0; 2]),
-        };
-        let row = |depth| dcce::constraint(&change(depth), 400.0, &Twist::zero()).row();
-        let at = Vector4::new(2.5, 0.02, -0.03, 0.01);
-        for k in 0..3 {
-            let step = Vector4::ith(k, 1e-6);
-            let numeric = (row(at + step) - row(at - step)) / 2e-6;
-            assert!((numeric - row_jacobian(&change(at), 400.0).column(k)).amax() < 1e-7, "{k}");
-        }
     }
 }

@@ -2,12 +2,20 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::row::Row;
+use super::row::{NormalEquations, Row};
 use crate::estimate::certainty::blocks::BlockScore;
 use crate::estimate::certainty::covariance::covariance;
 use crate::estimate::certainty::observability::Observability;
 use crate::estimate::motion_estimate::Estimate;
+use crate::estimate::unsolvable::Unsolvable;
 use crate::geometry::Gaussian;
+
+/// A direction is determined whose information exceeds that of the coefficients' noise by this many standard deviations:
+/// more would call weak directions unobserved, less would let noise pass for information.
+pub(super) const DETERMINED_SIGMAS: f64 = 2.5;
+/// Variance of what noise adds to the information along a direction, for each row, in units of its mean squared: 2 of
+/// a normal number's square, and half as much again since rows two pixels apart share a pixel.
+pub(super) const NOISE_VARIANCE: f64 = 3.0;
 
 /// What a linear estimator found: θ̂, the weight it gave each row, and how well θ̂ is determined.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +35,30 @@ pub struct LinearFit<const N: usize> {
 }
 
 impl<const N: usize> LinearFit<N> {
+    /// The fit without directions of which the noise of the coefficients may speak alone; `noise` is the covariance of
+    /// the i-th row's coefficients, N×N.
+    ///
+    /// Noise fills the normal equations up to full rank: along a direction x that no row determines,
+    /// xᵀ (Σ w a aᵀ) x is Σ w xᵀ N x, give or take its own scatter.
+    ///
+    /// # Errors
+    /// [`Unsolvable::Unobservable`] when no direction is left.
+    pub(crate) fn beyond_noise(
+        self,
+        rows: &[Row<N>],
+        noise: impl Fn(usize) -> SMatrix<f64, N, N>,
+    ) -> Result<Self, Unsolvable> {
+        let kept = || self.weights.iter().copied().enumerate().filter(|(_, weight)| *weight > 0.0);
+        let total: SMatrix<f64, N, N> = kept().map(|(i, weight)| noise(i) * weight).sum();
+        let scatter = DETERMINED_SIGMAS * (NOISE_VARIANCE / kept().count().max(1) as f64).sqrt();
+        let least = |x: &SVector<f64, N>| (1.0 + scatter) * x.dot(&(total * x));
+        let observability = self.observability.exceeding(least)?;
+        let weighted = rows.iter().zip(self.weights.iter().copied());
+        let equations = NormalEquations::of_weighted_rows(weighted);
+        let theta = observability.solve(&equations.information, &equations.moment)?;
+        Ok(Self { theta, observability, ..self })
+    }
+
     /// The estimate with its block-wise covariance; `rows` are those that were fitted.
     pub fn estimate(&self, rows: &[Row<N>]) -> Estimate<N> {
         debug_assert_eq!(rows.len(), self.weights.len(), "these are not the rows that were fitted");

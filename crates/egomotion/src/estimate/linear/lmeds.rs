@@ -9,6 +9,7 @@ use super::best_subset::{BestSubset, STRIP, best_subset, square};
 use super::fit::LinearFit;
 use super::least_squares::{Weighting, least_squares};
 use super::row::{NormalEquations, Row};
+use crate::estimate::certainty::observability::Observability;
 use crate::estimate::random_subsets::{random_subsets, subsets_needed};
 use crate::estimate::unsolvable::Unsolvable;
 use crate::geometry::distribution::SIGMA_PER_MEDIAN_DEVIATION;
@@ -18,6 +19,9 @@ use crate::geometry::median;
 const ROUNDED_ZERO_SHARE: f64 = 0.05;
 /// Refits end when no unknown moves by more than this share of its standard deviation.
 const REFIT_TOLERANCE: f64 = 1e-3;
+/// A direction is determined by the kept rows when they have at least this share of the information of all rows whose
+/// residuals their own σ explains: less means that the search has chosen rows which do not speak of it.
+const LEAST_KEPT_SHARE: f64 = 0.05;
 /// Least squared residual that makes an outlier: residuals of an exact fit are rounding errors, and a scale of zero
 /// must not reject them all.
 const LEAST_CUT2: f64 = 1e-24;
@@ -87,8 +91,8 @@ pub fn refit_best_subset<const N: usize>(
     found: &BestSubset<N>,
     options: &LmedsOptions,
 ) -> Result<LinearFit<N>, Unsolvable> {
-    let refitting =
-        Refitting { rows, weighting, options, rounded: options.reweights > 1 && are_rounded(rows) };
+    let rounded = options.reweights > 1 && are_rounded(rows);
+    let refitting = Refitting { rows, weighting, options, rounded, least_scale: own_scale(rows, weighting) };
     let first = refitting.settle(&found.theta, found.median_square);
     if !refitting.rounded {
         return first;
@@ -110,12 +114,21 @@ fn are_rounded<const N: usize>(rows: &[Row<N>]) -> bool {
     zeros as f64 > ROUNDED_ZERO_SHARE * rows.len() as f64
 }
 
+/// The median of the rows' own σ, in units of their weighted residuals.
+fn own_scale<const N: usize>(rows: &[Row<N>], weighting: Weighting) -> f64 {
+    let mut own: Vec<f64> = rows.iter().map(|row| weighting.of(row).sqrt() * row.sigma).collect();
+    let middle = median(&mut own);
+    if middle.is_finite() { middle } else { 0.0 }
+}
+
 /// What refits go by.
 struct Refitting<'a, const N: usize> {
     rows: &'a [Row<N>],
     weighting: Weighting,
     options: &'a LmedsOptions,
     rounded: bool,
+    /// The scale is at least this: where half the rows fit to rounding, those that fit within their σ are no outliers.
+    least_scale: f64,
 }
 
 impl<const N: usize> Refitting<'_, N> {
@@ -138,7 +151,7 @@ impl<const N: usize> Refitting<'_, N> {
 
     /// Least squares of what is kept, until that settles.
     fn settle(&self, theta: &SVector<f64, N>, median_square: f64) -> Result<LinearFit<N>, Unsolvable> {
-        let scale_of = |median_square| robust_scale(median_square, self.rows.len(), N);
+        let scale_of = |median_square| robust_scale(median_square, self.rows.len(), N).max(self.least_scale);
         let mut scale = scale_of(median_square);
         let mut weights = self.kept(theta, scale);
         let mut equations = NormalEquations::in_strips(self.rows, &weights);
@@ -157,9 +170,29 @@ impl<const N: usize> Refitting<'_, N> {
                 break;
             }
         }
-        let (theta, observability) = fit;
+        let (theta, observability) = self.judged(&fit.0, &equations, fit.1, scale)?;
         let inliers = weights.iter().filter(|&&w| w > 0.0).count();
         Ok(LinearFit { theta, weights, observability, bread: None, inliers, residual_scale: scale })
+    }
+
+    /// The answer without directions of which hardly any but rejected rows speak that their own σ would explain.
+    fn judged(
+        &self,
+        theta: &SVector<f64, N>,
+        kept: &NormalEquations<N>,
+        observability: Observability,
+        scale: f64,
+    ) -> Result<(SVector<f64, N>, Observability), Unsolvable> {
+        let explained = |row: &Row<N>| {
+            let weight = self.weighting.of(row);
+            let limit = self.options.cut * scale.max(weight.sqrt() * row.sigma);
+            if weight * row.residual(theta).powi(2) <= limit * limit { weight } else { 0.0 }
+        };
+        let weights: Vec<f64> = self.rows.par_iter().with_min_len(STRIP).map(explained).collect();
+        let all = NormalEquations::in_strips(self.rows, &weights).information;
+        let observability = observability
+            .exceeding(|direction: &SVector<f64, N>| LEAST_KEPT_SHARE * direction.dot(&(all * direction)))?;
+        Ok((observability.solve(&kept.information, &kept.moment)?, observability))
     }
 
     /// Sum of squared residuals in units of σ, none counted beyond the cut.

@@ -212,15 +212,20 @@ impl Body<'_> {
         xyd: &Vector3<f64>,
         variance: f64,
     ) -> Option<DepthVelocity> {
-        let predicted = self.rigid.as_ref()?.depth_velocity(xyd, variance.sqrt())?;
+        let predicted = self.scaled(&self.rigid.as_ref()?.depth_velocity(xyd, variance.sqrt())?);
         (!contradict(&self.scaled(measured), &predicted)).then_some(predicted)
     }
 
-    /// A measurement with the scatter of the body's pixels.
-    pub(super) fn scaled(&self, measured: &DepthVelocity) -> DepthVelocity {
-        let Gaussian { mean, cov } = measured.z_vz;
-        DepthVelocity { z_vz: Gaussian { mean, cov: cov * self.scale2 } }
+    /// What was measured, or predicted by the body's motion, with the scatter of the body's pixels.
+    pub(super) fn scaled(&self, stated: &DepthVelocity) -> DepthVelocity {
+        widened(stated, self.scale2)
     }
+}
+
+/// The same Z and VZ with `scale2` times the covariance.
+fn widened(stated: &DepthVelocity, scale2: f64) -> DepthVelocity {
+    let Gaussian { mean, cov } = stated.z_vz;
+    DepthVelocity { z_vz: Gaussian { mean, cov: cov * scale2 } }
 }
 
 /// What the pixels of a region show.
@@ -284,7 +289,9 @@ impl Sampled {
         let (d, variance) = upper_median(&mut self.disparities.clone(), |a, b| a.0.total_cmp(&b.0))?;
         let (x, y) = rig.image_from_pixel(centre_px.0, centre_px.1);
         let centre = Vector3::new(x, y, d);
+        let scale2 = rigid.as_ref().map_or(1.0, |rigid| self.scale2(rigid));
         let by_motion = rigid.as_ref().and_then(|rigid| rigid.depth_velocity(&centre, variance.sqrt()));
+        let by_motion = by_motion.map(|predicted| widened(&predicted, scale2));
         let by_vz = |a: &DepthVelocity, b: &DepthVelocity| a.vz().value().total_cmp(&b.vz().value());
         let measured = || upper_median(&mut self.velocities.iter().map(|m| m.2).collect::<Vec<_>>(), by_vz);
         let velocity = by_motion.or_else(measured)?;
@@ -297,7 +304,6 @@ impl Sampled {
             depth_velocity: velocity.vz(),
             impact: velocity.looming(dt_s).map(|looming| TimeToImpact { looming }),
         };
-        let scale2 = rigid.as_ref().map_or(1.0, |rigid| self.scale2(rigid));
         Some(Body { group, rigid, scale2 })
     }
 

@@ -1,11 +1,13 @@
 //! φ of a pair of frames from what was observed of it.
 
+mod contradiction;
 mod first_motion;
 mod observed;
 mod scene_motion;
 mod shape;
 mod solver;
 
+pub use contradiction::{BiasCause, Contradiction, contradiction};
 pub(super) use first_motion::{first_motion, refined_motion};
 pub use observed::Observed;
 pub use solver::Solver;
@@ -36,7 +38,9 @@ pub fn solve(
         (Equations::FlowLikelihood, _) => solver.likelihood(&observed.flows(interval)),
         (Equations::DepthChange, _) => solver.depth_change(&observed.depth_changes(interval)),
         (Equations::BinocularFlow, _) => solver.binocular(&observed.flows(interval)),
+        (Equations::BinocularDisplacement, _) => solver.binocular_displacement(&observed.tracks(interval)),
         (Equations::JointFlow, _) => solver.joint(&observed.flows(interval)),
+        (Equations::JointDisplacement, _) => solver.joint_displacement(&observed.tracks(interval)),
         (Equations::Alignment(form), _) => solver.alignment(&observed.tracks(interval), form),
     };
     found?.with_unbounded_unobserved()

@@ -26,17 +26,11 @@ impl Observed<'_> {
         }
     }
 
-    /// Velocities: of finite displacements in the discrete approach, at the middle of the interval in the
-    /// differential one.
+    /// Velocities at the middle of the interval.
     pub(super) fn flows(&self, interval: &Interval<'_>) -> Vec<StereoFlow> {
-        match (self, interval.plan.approach) {
-            (Observed::Fields(pair, _), Approach::Differential) => {
-                pair.every(interval.config.sample_step_px, DensePair::stereo_flow)
-            }
-            (_, Approach::Discrete) => self.tracks(interval).iter().map(StereoTrack::discrete_flow).collect(),
-            (_, Approach::Differential) => {
-                self.tracks(interval).iter().map(StereoTrack::midpoint_flow).collect()
-            }
+        match self {
+            Observed::Fields(pair, _) => pair.every(interval.config.sample_step_px, DensePair::stereo_flow),
+            Observed::Tracks(tracks) => tracks.iter().map(StereoTrack::midpoint_flow).collect(),
         }
     }
 

@@ -1,16 +1,17 @@
 //! The methods on observations at hand, each with the configured estimator.
 
-use crate::constrain::{binocular_flow, dcce, image_flow};
+use crate::constrain::displacement::{self, DisplacementConstraints};
+use crate::constrain::{LinearConstraint, binocular_flow, dcce, image_flow};
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
 use crate::estimate::{
     Blocks, LikelihoodTerm, LinearFit, LmedsOptions, MaximumLikelihood, MotionEstimate, Row, SensedTrack,
     SensorErrors, SensorPrior, Tolerance, TrackSource, Unsolvable, Weighting, augmented_step,
     errors_in_variables, least_squares, lmeds, m_estimate, maximum_likelihood, two_step,
 };
-use crate::geometry::{StereoRig, Twist};
+use crate::geometry::{CayleyMotion, StereoRig, Twist};
 use crate::observe::{DepthChange, StereoFlow, StereoTrack};
 use crate::pipeline::config::{Config, EstimatorKind};
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, SVector};
 
 /// The sensor's errors are corrected and estimated again at most this many times.
 const SENSOR_ROUNDS: usize = 5;
@@ -46,7 +47,7 @@ impl<'a> Solver<'a> {
             EstimatorKind::Lmeds => lmeds(rows, Weighting::Unit, &self.lmeds()),
             // Noise in the regressors is that of observations, which rows alone do not tell; `Config::check` refuses it.
             EstimatorKind::Irls | EstimatorKind::Eiv => {
-                let start = least_squares(rows, Weighting::InverseVariance)?.theta;
+                let start = lmeds(rows, Weighting::InverseVariance, &self.lmeds())?.theta;
                 m_estimate(rows, &start, &self.config.irls)
             }
         }
@@ -141,7 +142,11 @@ impl<'a> Solver<'a> {
                 Row::from_constraint(&constraint, self.blocks.index(change.x_px, change.y_px))
             })
             .collect();
-        Ok(self.fit(&rows)?.estimate(&rows))
+        let noise = |i: usize| {
+            let noise = dcce::row_noise(&changes[i], self.rig.focal_px);
+            noise.fixed_view::<6, 6>(0, 0).into_owned()
+        };
+        Ok(self.fit(&rows)?.beyond_noise(&rows, noise)?.estimate(&rows))
     }
 
     fn flow_rows(&self, flows: &[StereoFlow]) -> Vec<Row<6>> {
@@ -169,6 +174,18 @@ impl<'a> Solver<'a> {
         two_step(&dv, &self.flow_rows(flows), |rows| self.fit(rows))
     }
 
+    /// Binocular flow in two steps, of finite displacements: exact in the mean point, with (τ, w) in place of φ.
+    ///
+    /// # Errors
+    /// [`Unsolvable`] when the observations do not determine a motion.
+    pub fn binocular_displacement(&self, tracks: &[StereoTrack]) -> Result<MotionEstimate, Unsolvable> {
+        let (depth, image) = self.displacement_rows(tracks, |depth| {
+            let z = depth.point.z;
+            depth.scaled(-1.0 / (z * z))
+        });
+        Ok(two_step(&depth, &image, |rows| self.fit(rows))?.from_cayley())
+    }
+
     /// Binocular flow and image flow at once: rows in metres and in pixels only add up in units of their σ.
     ///
     /// # Errors
@@ -179,14 +196,50 @@ impl<'a> Solver<'a> {
             let constraint = binocular_flow::constraint(flow, self.rig, self.start);
             Row::from_constraint(&constraint, self.blocks.index(flow.x_px, flow.y_px))
         }));
-        let fit = match self.config.estimator {
-            EstimatorKind::Ls => least_squares(&rows, Weighting::InverseVariance)?,
-            EstimatorKind::Lmeds => lmeds(&rows, Weighting::InverseVariance, &self.lmeds())?,
-            EstimatorKind::Irls | EstimatorKind::Eiv => {
-                m_estimate(&rows, &self.start.vector(), &self.config.irls)?
-            }
-        };
-        Ok(fit.estimate(&rows))
+        Ok(self.fit_weighted(&rows, &self.start.vector())?.estimate(&rows))
+    }
+
+    /// The same of finite displacements: exact in the mean point, with (τ, w) in place of φ.
+    ///
+    /// # Errors
+    /// [`Unsolvable`] when the observations do not determine a motion.
+    pub fn joint_displacement(&self, tracks: &[StereoTrack]) -> Result<MotionEstimate, Unsolvable> {
+        let (depth, mut rows) = self.displacement_rows(tracks, |depth| depth);
+        rows.extend(depth);
+        let start = CayleyMotion::from_twist(self.start).vector();
+        Ok(self.fit_weighted(&rows, &start)?.estimate(&rows).from_cayley())
+    }
+
+    /// The rows of depth, in the units that `scaled` gives them, and those of the image.
+    fn displacement_rows(
+        &self,
+        tracks: &[StereoTrack],
+        scaled: impl Fn(LinearConstraint) -> LinearConstraint,
+    ) -> (Vec<Row<6>>, Vec<Row<6>>) {
+        let at = CayleyMotion::from_twist(self.start);
+        let (mut depth_rows, mut image_rows) = (Vec::new(), Vec::new());
+        for track in tracks {
+            let place = &track.before.mean;
+            let block = self.blocks.index(place.x, place.y);
+            let found = displacement::constraints(track, self.rig, &at);
+            let Some(DisplacementConstraints { image, depth }) = found else { continue };
+            depth_rows.push(Row::from_constraint(&scaled(depth), block));
+            image_rows.extend(image.map(|constraint| Row::from_constraint(&constraint, block)));
+        }
+        (depth_rows, image_rows)
+    }
+
+    /// The configured estimator on rows of several units, each weighed by its σ.
+    fn fit_weighted<const N: usize>(
+        &self,
+        rows: &[Row<N>],
+        start: &SVector<f64, N>,
+    ) -> Result<LinearFit<N>, Unsolvable> {
+        match self.config.estimator {
+            EstimatorKind::Ls => least_squares(rows, Weighting::InverseVariance),
+            EstimatorKind::Lmeds => lmeds(rows, Weighting::InverseVariance, &self.lmeds()),
+            EstimatorKind::Irls | EstimatorKind::Eiv => m_estimate(rows, start, &self.config.irls),
+        }
     }
 
     /// Point pairs, (22), with a rotation or any matrix.
