@@ -7,6 +7,7 @@ use super::matching::MatchedFrames;
 use egomotion::geometry::Field;
 use egomotion::motion::DepthVelocity;
 use egomotion::motion::depth_velocity::{dcce, dv, dv_discrete};
+use egomotion::observe::GradientStencil;
 use egomotion::pipeline::{Approach, FrameMotion, Method};
 
 /// The contenders of finding VZ at a pixel: (7), (9), (17) and (21).
@@ -34,7 +35,9 @@ fn map(matched: &MatchedFrames, contender: ImageContender) -> Field {
         match (contender.method, contender.approach) {
             (Method::Dcce, Approach::Differential) => Some(dcce(&matched.depth_flow(u, v)?.depth_change(bf))),
             (Method::Dv, Approach::Differential) => Some(dv(&matched.stereo_flow(u, v)?, bf)),
-            (Method::Dcce, Approach::Discrete) => Some(dcce(&pair.depth_track(u, v)?.depth_change(bf))),
+            (Method::Dcce, Approach::Discrete) => {
+                Some(dcce(&pair.depth_track(u, v, GradientStencil::CentralDifference)?.depth_change(bf)))
+            }
             (Method::Dv, Approach::Discrete) => Some(dv_discrete(&pair.stereo_track(u, v)?, bf)),
             _ => None,
         }

@@ -10,7 +10,7 @@ use crate::synthetic::APPROACHES;
 use egomotion::estimate::alignment::Form;
 use egomotion::estimate::{MotionEstimate, Unsolvable};
 use egomotion::geometry::{Field, StereoRig, Twist};
-use egomotion::observe::{DensePair, DepthChange, StereoFlow, StereoTrack};
+use egomotion::observe::{DensePair, DepthChange, GradientStencil, StereoFlow, StereoTrack};
 use egomotion::pipeline::PipelineError;
 use egomotion::pipeline::solve::Solver;
 use egomotion::pipeline::{Approach, Config, EstimatorKind, FrameMotion, Method, StereoFrame, StereoMotion};
@@ -70,7 +70,9 @@ fn by_printed_methods(
     let tracks = pair.every(step_px, DensePair::stereo_track);
     let changes: [Vec<DepthChange>; 2] = [
         pair.every(step_px, |_, u, v| Some(matched.depth_flow(u, v)?.depth_change(bf))),
-        pair.every(step_px, |pair, u, v| Some(pair.depth_track(u, v)?.depth_change(bf))),
+        pair.every(step_px, |pair, u, v| {
+            Some(pair.depth_track(u, v, GradientStencil::CentralDifference)?.depth_change(bf))
+        }),
     ];
     let flows: [Vec<StereoFlow>; 2] = [
         pair.every(step_px, |_, u, v| matched.stereo_flow(u, v)),

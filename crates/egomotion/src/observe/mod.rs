@@ -31,6 +31,6 @@ pub use observation::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrac
 pub use pyramid::{Pyramid, smooth};
 pub use rectifier::{RectificationMap, Rectifier};
 pub use row_disagreement::row_disagreement;
-pub use sample::DensePair;
+pub use sample::{DensePair, GradientStencil};
 pub use stereo_pyramid::StereoPyramid;
 pub use tracks::TrackOptions;

@@ -16,6 +16,15 @@ const SURFACE_NOISE_SIGMAS: f64 = 3.0;
 /// Slope of disparity, in pixels per pixel, from which on the stencil of a gradient straddles a depth edge.
 const EDGE_SLOPE: f64 = 1.0;
 
+/// What a gradient of disparity is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GradientStencil {
+    /// The two neighbours, as the paper has it: σ² of each coordinate is ½ σ²_d, as though their noise were independent.
+    CentralDifference,
+    /// A plane through 9 × 9 pixels: little noise, and that of the window.
+    Plane,
+}
+
 /// The dense fields of one pair of frames.
 #[derive(Debug, Clone, Copy)]
 pub struct DensePair<'a> {
@@ -178,18 +187,18 @@ impl DensePair<'_> {
     }
 
     /// Discrete DCCE: disparity at the pixel at t and t′, its gradient at t′, and the displacement.
-    pub fn depth_track(&self, u: usize, v: usize) -> Option<DepthTrack> {
+    pub fn depth_track(&self, u: usize, v: usize, stencil: GradientStencil) -> Option<DepthTrack> {
         let before = self.before(u, v)?;
         let [x, y, d] = before.mean.into();
-        let (after, gradient) = disparity_at(self.rig, self.after, x, y)?;
-        let (var, var_after) = (before.cov[(2, 2)], after.variance());
+        let (after, central) = disparity_at(self.rig, self.after, x, y)?;
+        let gradient = self.gradient(self.after, stencil, (x, y), (central, after.variance()))?;
+        let mut cov = Matrix4::from_diagonal(&Vector4::new(before.cov[(2, 2)], after.variance(), 0.0, 0.0));
+        cov.fixed_view_mut::<2, 2>(2, 2).copy_from(&gradient.cov);
+        let mean = Vector4::new(d, after.value(), gradient.mean.x, gradient.mean.y);
         Some(DepthTrack {
             x_px: x,
             y_px: y,
-            disparity: Gaussian::independent(
-                [d, after.value(), gradient.x, gradient.y],
-                [var, var_after, 0.5 * var_after, 0.5 * var_after / self.rig.aspect().powi(2)],
-            ),
+            disparity: Gaussian { mean, cov },
             displacement: self.displacement(u, v)?,
         })
     }
@@ -198,23 +207,49 @@ impl DensePair<'_> {
     ///
     /// There the differences of one interval are central ones, so that the error of taking them for
     /// derivatives is of third order in the motion.
-    pub fn depth_flow(&self, u: usize, v: usize) -> Option<DepthFlow> {
+    pub fn depth_flow(&self, u: usize, v: usize, stencil: GradientStencil) -> Option<DepthFlow> {
         // A pixel without disparity of its own (masked, hidden) is none, whatever lies half-way.
         self.before.shift.get(u, v)?;
         let flow = self.displacement(u, v)?;
         let (x, y) = self.rig.image_from_pixel(u as f64, v as f64);
         let (x, y) = (x + 0.5 * flow.mean.x, y + 0.5 * flow.mean.y);
-        let (a, slope_a) = disparity_at(self.rig, self.before, x, y)?;
-        let (b, slope_b) = disparity_at(self.rig, self.after, x, y)?;
-        let slope = 0.5 * (slope_a + slope_b);
+        let (a, central_a) = disparity_at(self.rig, self.before, x, y)?;
+        let (b, central_b) = disparity_at(self.rig, self.after, x, y)?;
+        let slope_a = self.gradient(self.before, stencil, (x, y), (central_a, a.variance()))?;
+        let slope_b = self.gradient(self.after, stencil, (x, y), (central_b, b.variance()))?;
+        let slope = 0.5 * (slope_a.mean + slope_b.mean);
         let (sum, difference) = (a.variance() + b.variance(), b.variance() - a.variance());
-        // Central differences of both maps' mean; vertical ones are per image coordinate.
-        let (across, down) = (0.125 * sum, 0.125 * sum / self.rig.aspect().powi(2));
-        let mut cov = Matrix4::from_diagonal(&Vector4::new(0.25 * sum, across, down, sum));
+        let mut cov = Matrix4::from_diagonal(&Vector4::new(0.25 * sum, 0.0, 0.0, sum));
+        cov.fixed_view_mut::<2, 2>(1, 1).copy_from(&(0.25 * (slope_a.cov + slope_b.cov)));
         cov[(0, 3)] = 0.5 * difference;
         cov[(3, 0)] = 0.5 * difference;
         let mean = Vector4::new(0.5 * (a.value() + b.value()), slope.x, slope.y, b.value() - a.value());
         Some(DepthFlow { x_px: x, y_px: y, disparity: Gaussian { mean, cov }, flow })
+    }
+
+    /// The gradient of a map's disparity at image coordinates, of which the `central` one is given with the variance of
+    /// disparity.
+    fn gradient(
+        &self,
+        map: &DisparityMap,
+        stencil: GradientStencil,
+        (x, y): (f64, f64),
+        (central, variance): (Vector2<f64>, f64),
+    ) -> Option<Gaussian<2>> {
+        // Vertical ones are per image coordinate.
+        let aspect = self.rig.aspect();
+        match stencil {
+            GradientStencil::CentralDifference => {
+                let variances = Vector2::new(0.5 * variance, 0.5 * variance / (aspect * aspect));
+                Some(Gaussian { mean: central, cov: Matrix2::from_diagonal(&variances) })
+            }
+            GradientStencil::Plane => {
+                let (u, v) = self.rig.pixel_from_image(x, y);
+                let scale = Matrix2::from_diagonal(&Vector2::new(1.0, aspect.recip()));
+                let slope = map.slope(u, v)?;
+                Some(slope.propagate(scale * slope.mean, &scale))
+            }
+        }
     }
 
     /// Differential DV at the middle of the interval, from the flows of both cameras; without the right one's,

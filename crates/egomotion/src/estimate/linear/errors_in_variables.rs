@@ -8,7 +8,8 @@
 //!
 //! it is consistent (W. A. Fuller, "Measurement Error Models", 1987). N follows by one Jacobian from what was measured.
 //! Rows are scaled to disparity, by 1/Z², where noise is the same everywhere; further weights would come from the same
-//! noise. What is left is the error of differences in place of derivatives, of third order where a surface is curved
+//! noise. Where residuals are smaller than they would be by the stated noise, all of it is taken as smaller by as much
+//! (Fuller: error variances known but for a factor). What is left is the error of differences in place of derivatives, of third order where a surface is curved
 //! along the way a point goes in an interval: no noise model tells of it, but the scatter over blocks does.
 //!
 //! Noise alone fills the plain normal equations up to full rank. A direction is determined only where what the correction
@@ -147,7 +148,10 @@ fn scale(rows: &[NoisyRow], phi: &Vector6<f64>) -> f64 {
 /// The sums of every block over the rows that are no outliers at φ.
 fn sums(rows: &[NoisyRow], phi: &Vector6<f64>, blocks: &Blocks) -> Vec<CorrectedSums> {
     // A start far off makes all residuals large; then the median tells what is usual.
-    let cut = (OUTLIER_SIGMAS * scale(rows, phi).max(1.0)).powi(2);
+    let scale = scale(rows, phi);
+    let cut = (OUTLIER_SIGMAS * scale.max(1.0)).powi(2);
+    // Where residuals are smaller than their σ, so is the noise of the coefficients.
+    let noise_scale2 = (scale * scale).min(1.0);
     let strips: Vec<Vec<(usize, CorrectedSums)>> = rows
         .par_chunks(STRIP)
         .map(|strip| {
@@ -161,9 +165,9 @@ fn sums(rows: &[NoisyRow], phi: &Vector6<f64>, blocks: &Blocks) -> Vec<Corrected
                     runs.push((row.block, CorrectedSums::zero()));
                 }
                 let Some((_, sums)) = runs.last_mut() else { continue };
-                let noise: Matrix6<f64> = row.noise.fixed_view::<6, 6>(0, 0).into();
+                let noise: Matrix6<f64> = row.noise.fixed_view::<6, 6>(0, 0) * noise_scale2;
                 sums.information += row.a * row.a.transpose() - noise;
-                sums.moment += row.a * row.b - row.noise.fixed_view::<6, 1>(0, 6);
+                sums.moment += row.a * row.b - row.noise.fixed_view::<6, 1>(0, 6) * noise_scale2;
                 sums.noise += noise;
                 sums.square += e * e;
                 sums.variance += variance;

@@ -8,7 +8,8 @@ use crate::estimate::certainty::covariance::covariance;
 use crate::estimate::certainty::observability::Observability;
 use crate::estimate::motion_estimate::Estimate;
 use crate::estimate::unsolvable::Unsolvable;
-use crate::geometry::Gaussian;
+use crate::geometry::distribution::SIGMA_PER_MEDIAN_DEVIATION;
+use crate::geometry::{Gaussian, median};
 
 /// A direction is determined whose information exceeds that of the coefficients' noise by this many standard deviations:
 /// more would call weak directions unobserved, less would let noise pass for information.
@@ -16,6 +17,14 @@ pub(super) const DETERMINED_SIGMAS: f64 = 2.5;
 /// Variance of what noise adds to the information along a direction, for each row, in units of its mean squared: 2 of
 /// a normal number's square, and half as much again since rows two pixels apart share a pixel.
 pub(super) const NOISE_VARIANCE: f64 = 3.0;
+
+/// Squared scale of most residuals in units of the rows' σ², at most 1: by how much noise is less than stated.
+pub(super) fn noise_scale2<const N: usize>(rows: &[Row<N>], theta: &SVector<f64, N>) -> f64 {
+    let standard = |row: &Row<N>| (row.sigma > 0.0).then(|| row.residual(theta).abs() / row.sigma);
+    let middle = median(&mut rows.iter().filter_map(standard).collect::<Vec<f64>>());
+    let scale = SIGMA_PER_MEDIAN_DEVIATION * middle;
+    if scale.is_finite() { (scale * scale).min(1.0) } else { 1.0 }
+}
 
 /// What a linear estimator found: θ̂, the weight it gave each row, and how well θ̂ is determined.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,7 +48,8 @@ impl<const N: usize> LinearFit<N> {
     /// the i-th row's coefficients, N×N.
     ///
     /// Noise fills the normal equations up to full rank: along a direction x that no row determines,
-    /// xᵀ (Σ w a aᵀ) x is Σ w xᵀ N x, give or take its own scatter.
+    /// xᵀ (Σ w a aᵀ) x is Σ w xᵀ N x, give or take its own scatter. Where residuals are smaller than their σ, so is the
+    /// noise.
     ///
     /// # Errors
     /// [`Unsolvable::Unobservable`] when no direction is left.
@@ -50,6 +60,7 @@ impl<const N: usize> LinearFit<N> {
     ) -> Result<Self, Unsolvable> {
         let kept = || self.weights.iter().copied().enumerate().filter(|(_, weight)| *weight > 0.0);
         let total: SMatrix<f64, N, N> = kept().map(|(i, weight)| noise(i) * weight).sum();
+        let total = total * noise_scale2(rows, &self.theta);
         let scatter = DETERMINED_SIGMAS * (NOISE_VARIANCE / kept().count().max(1) as f64).sqrt();
         let least = |x: &SVector<f64, N>| (1.0 + scatter) * x.dot(&(total * x));
         let observability = self.observability.exceeding(least)?;

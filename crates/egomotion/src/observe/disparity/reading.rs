@@ -1,7 +1,9 @@
 //! Disparity read from a map between its pixels, as that of the one surface that is there.
 
+use nalgebra::{Matrix2, Vector2};
+
 use super::DisparityMap;
-use crate::geometry::{Field, Grid};
+use crate::geometry::{Field, Gaussian, Grid};
 
 /// Half the side of the window that is looked at, in pixels: a larger one averages more noise and bends more.
 const RADIUS: usize = 2;
@@ -10,6 +12,14 @@ const RADIUS: usize = 2;
 const STEEPEST_SURFACE: f64 = 1.0;
 /// Noise that still belongs to a surface, in standard deviations.
 const SURFACE_NOISE_SIGMAS: f64 = 3.0;
+/// Half the side of the window of [`DisparityMap::slope`], in pixels: of a surface's curvature its symmetric window sees
+/// nothing but the third order, and its noise is a tenth of that of a difference over two pixels.
+const SLOPE_RADIUS: usize = 4;
+/// A pixel belongs to the surface of a slope that lies off its plane by no more than this, in pixels, beside noise: what a
+/// curved surface does within the window.
+const CURVED_PX: f64 = 0.25;
+/// Least share of the window that a slope is made of: of less than half the curvature does not cancel.
+const LEAST_SLOPE_SHARE: f64 = 0.6;
 /// Fewest pixels that make a slope.
 const FEWEST_SLOPE_PIXELS: f64 = 6.0;
 /// Errors of neighbours are taken as one over so many pixels: depth is measured in windows.
@@ -62,6 +72,35 @@ impl DisparityMap {
         let shape = (misfit - sigma * sigma).max(0.0);
         let variance = sigma * sigma / independent + shape + share * furthest * furthest;
         Some(Reading { shift: centre + value, variance, slope })
+    }
+
+    /// The slope of the surface around (u, v) with its covariance, (∂/∂u, ∂/∂v) in px/px; `None` at its borders.
+    ///
+    /// A plane through a window of 9 × 9 pixels. Errors of neighbours are shared, as those of matched windows are.
+    pub(crate) fn slope(&self, u: f64, v: f64) -> Option<Gaussian<2>> {
+        let near = self.read(u, v)?;
+        let (width, height) = self.shift.size();
+        let (u0, v0) = (u.round() as usize, v.round() as usize);
+        let sigma = f64::from(self.sigma.get(u0, v0)?);
+        let mut plane = PlaneFit::default();
+        for row in v0.saturating_sub(SLOPE_RADIUS)..(v0 + SLOPE_RADIUS + 1).min(height) {
+            for column in u0.saturating_sub(SLOPE_RADIUS)..(u0 + SLOPE_RADIUS + 1).min(width) {
+                let Some(d) = self.shift.get(column, row) else { continue };
+                let (x, y) = (column as f64 - u, row as f64 - v);
+                let off = f64::from(d) - near.shift;
+                let expected = near.slope.0 * x + near.slope.1 * y;
+                if (off - expected).abs() <= CURVED_PX + SURFACE_NOISE_SIGMAS * sigma {
+                    plane.add(x, y, off);
+                }
+            }
+        }
+        let side = (2 * SLOPE_RADIUS + 1) as f64;
+        if plane.count < LEAST_SLOPE_SHARE * side * side {
+            return None;
+        }
+        let (_, slope, _) = plane.fit()?;
+        let cov = plane.slope_cofactors()? * (sigma * sigma * CORRELATION_AREA_PX);
+        Some(Gaussian { mean: Vector2::new(slope.0, slope.1), cov })
     }
 
     /// Disparity handed in by somebody else, as by a depth camera, with the standard deviation of each value where it
@@ -124,6 +163,13 @@ impl PlaneFit {
         self.zz += z * z;
     }
 
+    /// Covariance of the slope for independent values of variance 1; `None` of a line of points.
+    fn slope_cofactors(&self) -> Option<Matrix2<f64>> {
+        let about = |sum: f64, a: f64, b: f64| sum - a * b / self.count;
+        let xy = about(self.xy, self.x, self.y);
+        Matrix2::new(about(self.xx, self.x, self.x), xy, xy, about(self.yy, self.y, self.y)).try_inverse()
+    }
+
     /// Value at the origin, slope, and mean squared residual; `None` of few points or of a line of them.
     fn fit(&self) -> Option<(f64, (f64, f64), f64)> {
         if self.count < FEWEST_SLOPE_PIXELS {
@@ -165,6 +211,32 @@ mod tests {
         }
         assert_eq!(map.read(-0.6, 3.0), None);
         assert_eq!(map.read(f64::NAN, 3.0), None);
+    }
+
+    #[test]
+    fn a_slope_knows_the_noise_of_its_window() {
+        let plane = |u: usize, v: usize| 10.0 + 0.3 * u as f32 - 0.2 * v as f32;
+        let slope = map(plane).slope(9.3, 7.6).unwrap();
+        assert!((slope.mean - Vector2::new(0.3, -0.2)).amax() < 1e-5, "{slope:?}");
+        // Neighbours share their error over an area: noise is made of squares of 3 × 3 pixels.
+        let mut squares = [0.0; 2];
+        let trials: u32 = 400;
+        for trial in 0..trials {
+            let noise = |u: usize, v: usize| {
+                let hash = (u as u32 / 3 * 7919 + v as u32 / 3 * 104_729 + trial * 15_485_863)
+                    .wrapping_mul(2_654_435_761);
+                let hash = (hash ^ (hash >> 15)).wrapping_mul(2_246_822_519);
+                // Uniform, of standard deviation 0.1.
+                ((f64::from(hash ^ (hash >> 13)) / f64::from(u32::MAX) - 0.5) * 0.1 * 12f64.sqrt()) as f32
+            };
+            let found = map(|u, v| plane(u, v) + noise(u, v)).slope(9.0, 7.0).unwrap();
+            squares[0] += (found.mean.x - 0.3).powi(2) / found.cov.m11;
+            squares[1] += (found.mean.y + 0.2).powi(2) / found.cov.m22;
+        }
+        // A mean of 400 squares scatters by 7 %.
+        assert!(squares.iter().all(|sum| (0.75..1.25).contains(&(sum / f64::from(trials)))), "{squares:?}");
+        let edge = map(|u, _| if u < 10 { 20.0 } else { 5.0 });
+        assert_eq!(edge.slope(9.0, 8.0), None);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::groups::Groups;
 use crate::geometry::{Gaussian, StereoRig};
 use crate::motion::depth_velocity::{self, contradict};
 use crate::motion::{DepthVelocity, RigidPrediction, TimeToImpact, Vehicle};
-use crate::observe::DensePair;
+use crate::observe::{DensePair, GradientStencil};
 use crate::pipeline::plan::{Interval, PixelVelocity};
 use crate::simd::vectorised;
 
@@ -195,10 +195,15 @@ impl MapRow {
 fn measured_velocity(pair: &DensePair<'_>, by: PixelVelocity, u: usize, v: usize) -> Option<DepthVelocity> {
     let bf = pair.rig.depth_disparity_product();
     match by {
-        PixelVelocity::DepthTrack => Some(depth_velocity::dcce(&pair.depth_track(u, v)?.depth_change(bf))),
-        PixelVelocity::DepthFlow => {
-            Some(depth_velocity::dcce(&pair.depth_flow(u, v)?.depth_change(bf)).at_interval_start())
-        }
+        PixelVelocity::DepthTrack => Some(depth_velocity::dcce(
+            &pair.depth_track(u, v, GradientStencil::CentralDifference)?.depth_change(bf),
+        )),
+        PixelVelocity::DepthFlow => Some(
+            depth_velocity::dcce(
+                &pair.depth_flow(u, v, GradientStencil::CentralDifference)?.depth_change(bf),
+            )
+            .at_interval_start(),
+        ),
         PixelVelocity::StereoFlow => {
             Some(depth_velocity::dv(&pair.stereo_flow(u, v)?, bf).at_interval_start())
         }

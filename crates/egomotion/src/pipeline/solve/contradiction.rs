@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::observed::Observed;
 use crate::constrain::dcce;
 use crate::estimate::MotionEstimate;
+use crate::geometry::distribution::SIGMA_PER_MEDIAN_DEVIATION;
 use crate::geometry::{Twist, median};
 use crate::observe::{DepthChange, StereoTrack};
 use crate::pipeline::plan::{Equations, Interval};
@@ -126,15 +127,20 @@ fn cause(phi: &Twist, observed: &Observed<'_>, interval: &Interval<'_>) -> BiasC
 }
 
 /// By how much of its squared effect on the rows of (11), in units of disparity, a motion's is that of their noise.
+///
+/// Where residuals are smaller than their stated σ, so is the noise.
 fn noise_share(changes: &[DepthChange], phi: &Twist, focal_px: f64) -> f64 {
-    let phi = phi.vector();
+    let vector = phi.vector();
     let (mut noise, mut square) = (0.0, 0.0);
+    let mut residuals = Vec::with_capacity(changes.len());
     for change in changes {
         let weight = change.depth.mean[0].powi(-4);
-        let row = dcce::constraint(change, focal_px, &Twist::zero()).row();
+        let constraint = dcce::constraint(change, focal_px, phi);
         let own = dcce::row_noise(change, focal_px);
-        noise += weight * phi.dot(&(own.fixed_view::<6, 6>(0, 0) * phi));
-        square += weight * row.dot(&phi).powi(2);
+        noise += weight * vector.dot(&(own.fixed_view::<6, 6>(0, 0) * vector));
+        square += weight * constraint.row().dot(&vector).powi(2);
+        residuals.push((constraint.residual(phi) / constraint.sigma).abs());
     }
-    noise / square
+    let scale = SIGMA_PER_MEDIAN_DEVIATION * median(&mut residuals);
+    noise / square * if scale.is_finite() { (scale * scale).min(1.0) } else { 1.0 }
 }

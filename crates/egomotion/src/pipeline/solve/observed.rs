@@ -1,6 +1,6 @@
 //! What was observed of a pair of frames, as the observations that each method takes.
 
-use crate::observe::{DensePair, DepthChange, StereoFlow, StereoTrack};
+use crate::observe::{DensePair, DepthChange, GradientStencil, StereoFlow, StereoTrack};
 use crate::pipeline::config::Approach;
 use crate::pipeline::plan::Interval;
 
@@ -40,12 +40,12 @@ impl Observed<'_> {
         let step = interval.config.sample_step_px;
         match (self, interval.plan.approach) {
             (Observed::Tracks(_), _) => Vec::new(),
-            (Observed::Fields(pair, _), Approach::Discrete) => {
-                pair.every(step, |pair, u, v| Some(pair.depth_track(u, v)?.depth_change(bf)))
-            }
-            (Observed::Fields(pair, _), Approach::Differential) => {
-                pair.every(step, |pair, u, v| Some(pair.depth_flow(u, v)?.depth_change(bf)))
-            }
+            (Observed::Fields(pair, _), Approach::Discrete) => pair.every(step, |pair, u, v| {
+                Some(pair.depth_track(u, v, GradientStencil::Plane)?.depth_change(bf))
+            }),
+            (Observed::Fields(pair, _), Approach::Differential) => pair.every(step, |pair, u, v| {
+                Some(pair.depth_flow(u, v, GradientStencil::Plane)?.depth_change(bf))
+            }),
         }
     }
 }
