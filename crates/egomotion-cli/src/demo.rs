@@ -76,6 +76,7 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
         config: &config,
         rig: &sequence.rig,
         input: InputKind::Stereo,
+        biased: summary.biased.is_some(),
         notes: Vec::new(),
     };
     write_report(&folder, &description, &outcome)?;

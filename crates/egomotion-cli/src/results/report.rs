@@ -25,6 +25,8 @@ pub struct RunDescription<'a> {
     pub config: &'a Config,
     pub rig: &'a StereoRig,
     pub input: InputKind,
+    /// Whether the method does not hold; a note says why.
+    pub biased: bool,
     /// What the reader should know besides.
     pub notes: Vec<String>,
 }
@@ -52,6 +54,7 @@ pub fn write_report(
         album: &outcome.album,
         stages_ms: outcome.stages_ms.clone(),
         frame_ms: outcome.frame_ms,
+        biased: description.biased,
         notes: description.notes.iter().cloned().chain(moving::note(&outcome.frames)).collect(),
     });
     folder.write(PAGE, page.as_bytes())

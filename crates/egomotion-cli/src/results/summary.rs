@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use egomotion::geometry::{StereoRectification, StereoRig};
 use egomotion::pipeline::Config;
+use egomotion::pipeline::solve::Contradiction;
 use egomotion_io::source::{DepthSensor, Sequence};
 use serde::Serialize;
 use serde_json::Value;
@@ -14,6 +15,19 @@ use crate::session::Outcome;
 
 /// Median disagreement of rows in pixels above which the user is warned: it then shows in every depth.
 const WARNED_ROW_DISAGREEMENT_PX: f64 = 0.25;
+
+/// Share of the answered motions that corners contradict from which on the user is warned: chance alone contradicts
+/// hardly any.
+const WARNED_SHARE_CONTRADICTED: f64 = 0.1;
+/// Name, factor and unit of φ's components as people read them.
+const COMPONENTS: [(&str, f64, &str); 6] = [
+    ("tX", 1.0, "m"),
+    ("tY", 1.0, "m"),
+    ("tZ", 1.0, "m"),
+    ("ΩX", 180.0 / std::f64::consts::PI, "°"),
+    ("ΩY", 180.0 / std::f64::consts::PI, "°"),
+    ("ΩZ", 180.0 / std::f64::consts::PI, "°"),
+];
 
 /// Number of rows by their `status`.
 pub type StatusCounts = BTreeMap<String, usize>;
@@ -52,6 +66,9 @@ pub struct Summary {
     /// Median over the frames of the vertical disparity of matches, in pixels: 0 if perfectly rectified.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_disagreement_px: Option<f64>,
+    /// Why the method cannot hold on this recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub biased: Option<String>,
     /// What makes the answers less certain than they say.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
@@ -95,6 +112,7 @@ impl Summary {
         let disagreements: Vec<f64> =
             outcome.frames.iter().filter_map(|frame| frame.motion.row_disagreement_px).collect();
         let row_disagreement_px = egomotion::metrics::quantile(&disagreements, 0.5);
+        let biased = biased(outcome);
         Self {
             version: env!("CARGO_PKG_VERSION"),
             source,
@@ -111,11 +129,36 @@ impl Summary {
             frame_ms: outcome.frame_ms,
             wall_s: outcome.wall_s,
             row_disagreement_px,
-            warnings: row_disagreement_px.and_then(badly_rectified).into_iter().collect(),
+            warnings: biased.iter().cloned().chain(row_disagreement_px.and_then(badly_rectified)).collect(),
+            biased,
             truth: MotionVerdict::of(outcome),
             truth_maps: None,
         }
     }
+}
+
+/// What to say of a method that tracked corners contradict.
+fn biased(outcome: &Outcome) -> Option<String> {
+    let answered = outcome.frames.iter().filter(|frame| frame.motion.motion.is_ok()).count();
+    let found: Vec<Contradiction> =
+        outcome.frames.iter().filter_map(|frame| frame.motion.contradiction).collect();
+    if found.is_empty() || (found.len() as f64) < WARNED_SHARE_CONTRADICTED * answered as f64 {
+        return None;
+    }
+    let component = (0..6).max_by_key(|&i| found.iter().filter(|c| c.component == i).count())?;
+    let of_it: Vec<Contradiction> = found.iter().filter(|c| c.component == component).copied().collect();
+    let middle = |value: fn(&Contradiction) -> f64| {
+        egomotion::metrics::quantile(&of_it.iter().map(value).collect::<Vec<f64>>(), 0.5)
+    };
+    let (name, factor, unit) = COMPONENTS[component];
+    Some(format!(
+        "The method does not hold on this recording. In {} of {answered} motions tracked corners contradict it, most \
+         often in {name}: {:.3} {unit} an interval in place of {:.3}. The cause: {}. Use --method ml.",
+        found.len(),
+        middle(|c| c.found)? * factor,
+        middle(|c| c.expected)? * factor,
+        of_it.get(of_it.len() / 2)?.cause,
+    ))
 }
 
 /// What to say of a pair whose rows disagree.

@@ -143,6 +143,7 @@ impl SequenceRun<'_> {
             config: &summary.config,
             rig: &summary.rig,
             input: input_kind(&opened.recording),
+            biased: summary.biased.is_some(),
             notes: notes(summary),
         };
         write_report(folder, &description, outcome)

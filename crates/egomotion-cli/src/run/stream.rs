@@ -83,6 +83,7 @@ fn write_results(
         config,
         rig,
         input: InputKind::Stereo,
+        biased: summary.biased.is_some(),
         notes: summary.warnings.clone(),
     };
     write_report(folder, &description, outcome)

@@ -70,7 +70,7 @@ fn warning_list(report: &Report<'_>) -> Markup {
         @if all.is_empty() {
             @if let Some(well) = warnings::all_well(report) { p class="well" { (well) } }
         } @else {
-            div class="notes" { p { b { "What to know before trusting it" } } ul { @for sentence in &all { li { (sentence) } } } }
+            div class="notes" id="warnings" { p { b { "What to know before trusting it" } } ul { @for sentence in &all { li { (sentence) } } } }
         }
     }
 }

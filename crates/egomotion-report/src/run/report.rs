@@ -42,6 +42,8 @@ pub struct Report<'a> {
     pub stages_ms: Vec<(&'static str, f64)>,
     /// Mean milliseconds a frame of everything.
     pub frame_ms: f64,
+    /// Whether the method does not hold on this recording, so that its numbers are wrong; a note says why.
+    pub biased: bool,
     /// What the reader should know besides, one sentence each.
     pub notes: Vec<String>,
 }

@@ -34,8 +34,12 @@ pub(crate) fn lede(report: &Report<'_>) -> Markup {
     let span = span_s(report).map_or(String::new(), |s| format!(" over {} seconds", significant(s, 3)));
     html! {
         p class="lede" {
+            @if report.biased && answered {
+                b { "These numbers are wrong: the chosen method does not hold on this recording." }
+                " " a href="#warnings" { "Why" } ". By this method it would seem that "
+            }
             @if answered {
-                "The camera " b { "travelled " (distance(report)) } span class="nobreak" { (span) }
+                @if report.biased { "the camera " } @else { "The camera " } b { "travelled " (distance(report)) } span class="nobreak" { (span) }
                 @if let Some(speed) = mean_speed(report) { ", " b { (speed) } " on average" }
                 @if let Some(turn) = turned(report) { ", and " (turn) }
                 "."

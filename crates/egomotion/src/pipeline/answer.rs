@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::interpret::{MotionMaps, MovingGroup};
+use super::solve::Contradiction;
 use super::stages::StageTimes;
 use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::motion::{NoObstacle, Obstacle, TimeToImpact};
@@ -36,6 +37,8 @@ pub struct FrameMotion {
     /// By how much matches of left and right lie on different rows in the reference frame, in pixels:
     /// how well the pair is rectified.
     pub row_disagreement_px: Option<f64>,
+    /// Where tracked corners contradict the answer of a linear method.
+    pub contradiction: Option<Contradiction>,
     /// The nearest obstacle that will pass through the vehicle's window, or why there is none.
     pub obstacle: Result<Obstacle, NoObstacle>,
     /// What moves by itself, the largest group first; found when observing densely.
@@ -61,6 +64,7 @@ impl FrameMotion {
             dt_s: reference.map(|(_, before_s)| time_s - before_s),
             motion: Err(why),
             row_disagreement_px: None,
+            contradiction: None,
             obstacle: Err(NoObstacle::NothingMeasured),
             moving: Vec::new(),
             dense: None,
@@ -83,6 +87,7 @@ impl FrameMotion {
             dt_s: Some(time_s - before_s),
             motion: pair.motion,
             row_disagreement_px: pair.row_disagreement_px,
+            contradiction: pair.contradiction,
             obstacle: pair.obstacle,
             moving: pair.moving,
             dense,
@@ -100,6 +105,7 @@ impl FrameMotion {
 pub(super) struct PairAnswer {
     pub(super) motion: Result<MotionEstimate, Unanswered>,
     pub(super) row_disagreement_px: Option<f64>,
+    pub(super) contradiction: Option<Contradiction>,
     pub(super) obstacle: Result<Obstacle, NoObstacle>,
     pub(super) moving: Vec<MovingGroup>,
 }
@@ -110,6 +116,7 @@ impl PairAnswer {
         Self {
             motion: Err(why.into()),
             row_disagreement_px: None,
+            contradiction: None,
             obstacle: Err(NoObstacle::NothingMeasured),
             moving: Vec::new(),
         }

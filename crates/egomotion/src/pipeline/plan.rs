@@ -28,6 +28,13 @@ pub enum Equations {
     Alignment(Form),
 }
 
+impl Equations {
+    /// Whether they are linear regressions, whose noise in the coefficients leaves a bias; maximum likelihood has none.
+    pub fn are_linear(self) -> bool {
+        !matches!(self, Self::TrackLikelihood | Self::ShapeLikelihood | Self::FlowLikelihood)
+    }
+}
+
 /// What gives VZ of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PixelVelocity {

@@ -10,7 +10,7 @@ use super::config::{Config, ConfigError, Method, Observe, PipelineError};
 use super::interpret;
 use super::memory::{Memory, TimedFrame};
 use super::plan::Interval;
-use super::solve::{Observed, first_motion, solve};
+use super::solve::{Observed, contradiction, first_motion, refined_motion, solve};
 use super::stages::{StageTimes, timed};
 use crate::estimate::TrackSource;
 use crate::geometry::median;
@@ -157,11 +157,16 @@ impl TrackMotion {
         config.maximum_likelihood.kernel.fitted &= tracks.len() >= FEWEST_FITTED;
         let interval = Interval::new(&self.rig, &config, TrackSource::Stereo, dt_s);
         let start = first_motion(&tracks, &interval, expected.as_ref());
-        let motion =
-            timed(&mut stages.estimate_ms, || solve(&Observed::Tracks(&tracks), &interval, Some(&start?)));
+        let observed = Observed::Tracks(&tracks);
+        let motion = timed(&mut stages.estimate_ms, || solve(&observed, &interval, Some(&start?)));
+        let linear = motion.as_ref().ok().filter(|_| interval.plan.equations.are_linear());
+        let contradiction = linear.zip(start.ok()).and_then(|(motion, start)| {
+            contradiction(motion, &refined_motion(&tracks, &interval, &start).ok()?, &observed, &interval)
+        });
         let obstacle = interpret::tracks(&tracks, motion.as_ref().ok(), rows, &interval);
         let motion = motion.map_err(Unanswered::from);
-        let answer = PairAnswer { motion, row_disagreement_px: rows, obstacle, moving: Vec::new() };
+        let answer =
+            PairAnswer { motion, row_disagreement_px: rows, contradiction, obstacle, moving: Vec::new() };
         let answer = FrameMotion::of_pair(before.moment(), after.moment(), answer, None, stages);
         self.memory.remember(&answer, before, after);
         answer

@@ -85,6 +85,7 @@ impl Run {
             album,
             stages_ms: vec![("disparity", 12.0), ("flow", 30.0)],
             frame_ms: 45.0,
+            biased: false,
             notes: Vec::new(),
         }
     }
@@ -149,6 +150,18 @@ fn every_text_of_the_input_is_escaped() {
     };
     let index = render_index(evil, evil, false, &[scene]);
     assert!(!index.contains("<script>alert") && !index.contains("<img src=http"));
+}
+
+#[test]
+fn a_method_that_does_not_hold_is_said_before_its_numbers() {
+    let run = steady(3);
+    let album = Album::of(3);
+    let page = render(&Report { biased: true, notes: vec!["The cause.".into()], ..run.report(&album) });
+    assert_sound(&page);
+    let wrong = page.find("These numbers are wrong").unwrap();
+    assert!(wrong < page.find("the camera <b>travelled").unwrap());
+    assert!(page.contains("href=\"#warnings\"") && page.contains("id=\"warnings\""));
+    assert!(!render(&run.report(&album)).contains("These numbers are wrong"));
 }
 
 #[test]

@@ -44,6 +44,9 @@ const LONGEST_NEWTON_STEP: f64 = 3.0;
 /// would foretell an endless way.
 const LARGEST_STEP_RATIO: f64 = 0.5;
 
+/// After the last iteration φ is good if it moved by no more than this share of its standard deviation: the gradient is
+/// then zero within its noise.
+const LAST_STEP_SIGMAS: f64 = 0.1;
 /// A step is taken back when the cost per observation rises by more than this: structures, which lag a step behind
 /// φ, change it by less.
 const COST_SLACK: f64 = 3e-3;
@@ -230,10 +233,7 @@ impl Iterate {
             if let Some(best) = accepted.as_ref().filter(|best| best.falls_to(cost, sums.whole.used)) {
                 damping = (damping * DAMPING_GROWTH).clamp(LEAST_DAMPING, MOST_DAMPING);
                 self.phi = best.stepped(&direction(&best.sums.whole, false, damping)?);
-                structures
-                    .iter_mut()
-                    .zip(observations)
-                    .for_each(|(s, observation)| *s = observation.structure());
+                structures.clone_from(&best.structures);
                 last_moved = 0.0;
                 continue;
             }
@@ -259,15 +259,18 @@ impl Iterate {
             if iteration > 0 && damping == 0.0 && rest <= kernel.tolerance * self.residuals.scale2.sqrt() {
                 return Ok((self, sums));
             }
-            accepted = Some(Accepted { phi: from, cost, sums });
+            accepted = Some(Accepted { phi: from, structures: structures.clone(), cost, sums });
         }
-        Err(Unsolvable::NotConverged)
+        // Expectation and maximisation come near the end slowly: what is left of the way is small beside φ's own error.
+        let near = damping == 0.0 && last_moved <= LAST_STEP_SIGMAS * self.residuals.scale2.sqrt();
+        accepted.filter(|_| near).map(|last| (self, last.sums)).ok_or(Unsolvable::NotConverged)
     }
 }
 
 /// The last φ from which the likelihood did not fall, with its sums.
 struct Accepted {
     phi: Twist,
+    structures: Vec<Vector3<f64>>,
     cost: f64,
     sums: FrameSums,
 }

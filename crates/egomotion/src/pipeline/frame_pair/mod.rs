@@ -8,10 +8,9 @@ use super::config::{Config, Observe};
 use super::frame::PreparedFrame;
 use super::interpret::{self, Meaning, MotionMaps};
 use super::plan::Interval;
-use super::solve::{Observed, refined_motion, solve};
+use super::solve::{Contradiction, Observed, contradiction, refined_motion, solve};
 use super::stages::{StageTimes, timed};
-use crate::estimate::TrackSource;
-use crate::estimate::Unsolvable;
+use crate::estimate::{MotionEstimate, TrackSource, Unsolvable};
 use crate::geometry::{Grid, StereoRig, Twist};
 use crate::observe::flow::FlowSpace;
 use crate::observe::tracks::StereoCorner;
@@ -80,14 +79,17 @@ impl<'a> FramePair<'a> {
         rows: Option<f64>,
         stages: &mut StageTimes,
     ) -> PairAnswer {
+        let observed = Observed::Tracks(&corners.tracks);
         let motion = timed(&mut stages.estimate_ms, || {
             let start = corners.motion.as_ref().map_err(|why| *why)?;
-            solve(&Observed::Tracks(&corners.tracks), &self.interval, Some(start))
+            solve(&observed, &self.interval, Some(start))
         });
+        let contradiction = self.contradiction(motion.as_ref().ok(), corners, &observed);
         let obstacle = interpret::tracks(&corners.tracks, motion.as_ref().ok(), rows, &self.interval);
         PairAnswer {
             motion: motion.map_err(Unanswered::from),
             row_disagreement_px: rows,
+            contradiction,
             obstacle,
             moving: Vec::new(),
         }
@@ -101,23 +103,37 @@ impl<'a> FramePair<'a> {
         space: &mut FlowSpace,
         stages: &mut StageTimes,
     ) -> Option<(PairAnswer, FlowField, MotionMaps)> {
-        let start = timed(&mut stages.tracks_ms, || self.refined(corners));
+        let start = timed(&mut stages.tracks_ms, || Some(self.refined(corners)?.phi()));
         let flows = timed(&mut stages.flow_ms, || self.flows(start.as_ref(), space))?;
         let fields = self.observe(&flows)?;
         let motion = timed(&mut stages.estimate_ms, || {
             solve(&Observed::Fields(fields, &corners.tracks), &self.interval, start.as_ref())
         });
+        let observed = Observed::Fields(fields, &corners.tracks);
+        let contradiction = self.contradiction(motion.as_ref().ok(), corners, &observed);
         let Meaning { maps, moving, obstacle } = timed(&mut stages.maps_ms, || {
             let motion = motion.as_ref().ok();
             interpret::fields(&fields, self.images(), &corners.tracks, motion, rows, &self.interval)
         });
         let motion = motion.map_err(Unanswered::from);
-        Some((PairAnswer { motion, row_disagreement_px: rows, obstacle, moving }, flows.left, maps))
+        let answer = PairAnswer { motion, row_disagreement_px: rows, contradiction, obstacle, moving };
+        Some((answer, flows.left, maps))
     }
 
     /// The first motion, refined on all tracks: it predicts flow, and the estimate begins with it.
-    fn refined(&self, corners: &FollowedCorners) -> Option<Twist> {
+    fn refined(&self, corners: &FollowedCorners) -> Option<MotionEstimate> {
         refined_motion(&corners.tracks, &self.interval, corners.motion.as_ref().ok()?).ok()
+    }
+
+    /// Where corners contradict the answer of a method that linearises.
+    fn contradiction(
+        &self,
+        motion: Option<&MotionEstimate>,
+        corners: &FollowedCorners,
+        observed: &Observed<'_>,
+    ) -> Option<Contradiction> {
+        let motion = motion.filter(|_| self.interval.plan.equations.are_linear())?;
+        contradiction(motion, &self.refined(corners)?, observed, &self.interval)
     }
 
     /// What every pixel shows: disparity of both frames, and the flows between them.

@@ -13,6 +13,7 @@ use crate::estimate::MotionEstimate;
 use crate::geometry::distribution::SIGMA_PER_MEDIAN_DEVIATION;
 use crate::geometry::{Twist, median};
 use crate::observe::{DepthChange, StereoTrack};
+use crate::pipeline::config::Approach;
 use crate::pipeline::plan::{Equations, Interval};
 
 /// Answers contradict each other beyond this many standard deviations of their difference: far more than six unbiased
@@ -120,6 +121,9 @@ fn cause(phi: &Twist, observed: &Observed<'_>, interval: &Interval<'_>) -> BiasC
     let pixels = median(&mut tracks.iter().map(moved).collect::<Vec<f64>>());
     if interval.plan.equations == Equations::DepthChange && pixels > FAR_PX {
         return BiasCause::LongDisplacement { pixels };
+    }
+    if interval.plan.approach == Approach::Discrete {
+        return BiasCause::Unknown;
     }
     let depth = |track: &StereoTrack| interval.rig.depth(track.before.mean.z);
     let share = phi.t.z.abs() / median(&mut tracks.iter().filter_map(depth).collect::<Vec<f64>>());

@@ -1,9 +1,9 @@
 //! A first motion from tracks alone: it guides what is observed next, and the estimate begins with it.
 
 use super::scene_motion::scene_motion;
-use crate::estimate::Unsolvable;
 use crate::estimate::maximum_likelihood;
 use crate::estimate::robust_start;
+use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::geometry::Twist;
 use crate::observe::StereoTrack;
 use crate::pipeline::plan::Interval;
@@ -20,7 +20,7 @@ pub(in crate::pipeline) fn first_motion(
     let options = &interval.config.seeded_likelihood();
     let of_most = |tracks: &[StereoTrack]| {
         let start = robust_start(tracks, interval.rig, expected, options)?;
-        refined_motion(tracks, interval, &start)
+        Ok(refined_motion(tracks, interval, &start)?.phi())
     };
     let found = of_most(tracks)?;
     let goes_on = |expected| scene_motion(tracks, interval.rig, found, expected, of_most);
@@ -35,7 +35,7 @@ pub(in crate::pipeline) fn refined_motion(
     tracks: &[StereoTrack],
     interval: &Interval<'_>,
     start: &Twist,
-) -> Result<Twist, Unsolvable> {
+) -> Result<MotionEstimate, Unsolvable> {
     let kernel = &interval.config.maximum_likelihood.kernel;
-    Ok(maximum_likelihood(tracks, interval.rig, start, None, kernel)?.motion.phi())
+    Ok(maximum_likelihood(tracks, interval.rig, start, None, kernel)?.motion)
 }
