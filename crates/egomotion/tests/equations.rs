@@ -359,7 +359,7 @@ fn lmeds_exhaustive() {
             .iter()
             .zip(&b)
             .enumerate()
-            .map(|(i, (a, &b))| Row { a: vector::<3>(a), b, sigma: 1.0, block: i })
+            .map(|(i, (a, &b))| Row { a: vector::<3>(a), b, sigma: 0.0, block: i })
             .collect();
         let n = rows.len();
         let subsets =

@@ -229,6 +229,7 @@ fn answer(
             residual_scale: 1.0,
         }),
         row_disagreement_px: None,
+        contradiction: None,
         obstacle: Err(NoObstacle::NothingMeasured),
         moving: Vec::new(),
         dense: None,

@@ -179,6 +179,8 @@ fn line(frame: &FrameResult) -> Value {
         "status": row.status,
         "phi": phi,
         "cov": cov,
+        "observed": motion.map(|m| m.observed),
+        "warning": frame.motion.contradiction.map(|found| found.cause.to_string()),
         "impact_s": row.impact_s.map(|s| s.map(finite)),
     })
 }

@@ -146,18 +146,23 @@ impl Measurement for StereoTrack {
         accumulate(&mut cov, &structure_jacobian, &gain);
         let inverse_cov = inverse(&cov)?;
         let pull = product(&inverse_cov, &e);
-        let shift = product(&gain, &pull);
-        let improved = self.before.mean + shift * restraint(pull.dot(&product(&structure_jacobian, &shift)));
+        let change = product(&gain, &pull);
+        let improved =
+            self.before.mean + change * restraint(pull.dot(&product(&structure_jacobian, &change)));
         if improved.z > LEAST_DISPARITY_SHARE * s.z {
             *s = improved;
         }
         let motion_jacobian = at.rig.velocity_jacobian(&predicted);
         let offset_jacobian = Vector3::z() - structure_jacobian.column(2);
         let (before, after) = (&self.before.mean, &self.after.mean);
+        // What matching displaces is the shift, of which the disparity is a constant away.
+        let shift = |d: f64| at.rig.shift_from_disparity(d);
         let phase_jacobian = Matrix3::from_data(ArrayStorage([
             [phase_wave(after.x - before.x), 0.0, 0.0],
             [0.0, phase_wave(after.y - before.y), 0.0],
-            (Vector3::z() * phase_wave(after.z) - structure_jacobian.column(2) * phase_wave(before.z)).into(),
+            (Vector3::z() * phase_wave(shift(after.z))
+                - structure_jacobian.column(2) * phase_wave(shift(before.z)))
+            .into(),
         ]));
         Some(Misclosure { e, inverse_cov, motion_jacobian, offset_jacobian, phase_jacobian })
     }

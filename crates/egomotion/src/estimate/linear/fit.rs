@@ -15,8 +15,9 @@ use crate::geometry::{Gaussian, median};
 /// more would call weak directions unobserved, less would let noise pass for information.
 pub(super) const DETERMINED_SIGMAS: f64 = 2.5;
 /// Variance of what noise adds to the information along a direction, for each row, in units of its mean squared: 2 of
-/// a normal number's square, and half as much again since rows two pixels apart share a pixel.
-pub(super) const NOISE_VARIANCE: f64 = 3.0;
+/// a normal number's square, half as much again since rows two pixels apart share a pixel, and 5.4 since the noise is
+/// scaled by the median of the residuals, whose relative variance that is.
+pub(super) const NOISE_VARIANCE: f64 = 3.0 + 5.4;
 
 /// Squared scale of most residuals in units of the rows' σ², at most 1: by how much noise is less than stated.
 pub(super) fn noise_scale2<const N: usize>(rows: &[Row<N>], theta: &SVector<f64, N>) -> f64 {

@@ -18,6 +18,9 @@ const SLOPE_RADIUS: usize = 4;
 /// A pixel belongs to the surface of a slope that lies off its plane by no more than this, in pixels, beside noise: what a
 /// curved surface does within the window.
 const CURVED_PX: f64 = 0.25;
+/// Variance of the slope of a plane through the small window, in units of σ²: 9 pixels share an error, and x² is 2 in the
+/// mean over 25 of them.
+const NEAR_SLOPE_VARIANCE: f64 = CORRELATION_AREA_PX / 50.0;
 /// Least share of the window that a slope is made of: of less than half the curvature does not cancel.
 const LEAST_SLOPE_SHARE: f64 = 0.6;
 /// Fewest pixels that make a slope.
@@ -89,7 +92,9 @@ impl DisparityMap {
                 let (x, y) = (column as f64 - u, row as f64 - v);
                 let off = f64::from(d) - near.shift;
                 let expected = near.slope.0 * x + near.slope.1 * y;
-                if (off - expected).abs() <= CURVED_PX + SURFACE_NOISE_SIGMAS * sigma {
+                // The slope that is expected is as uncertain as a plane through 5 × 5 pixels.
+                let noise = sigma * (1.0 + NEAR_SLOPE_VARIANCE * (x * x + y * y)).sqrt();
+                if (off - expected).abs() <= CURVED_PX + SURFACE_NOISE_SIGMAS * noise {
                     plane.add(x, y, off);
                 }
             }
@@ -223,18 +228,21 @@ mod tests {
         let trials: u32 = 400;
         for trial in 0..trials {
             let noise = |u: usize, v: usize| {
-                let hash = (u as u32 / 3 * 7919 + v as u32 / 3 * 104_729 + trial * 15_485_863)
+                let hash = (u as u32 / 3 * 7919 + v as u32 / 3 * 104_729)
+                    .wrapping_add(trial.wrapping_mul(15_485_863))
                     .wrapping_mul(2_654_435_761);
                 let hash = (hash ^ (hash >> 15)).wrapping_mul(2_246_822_519);
                 // Uniform, of standard deviation 0.1.
                 ((f64::from(hash ^ (hash >> 13)) / f64::from(u32::MAX) - 0.5) * 0.1 * 12f64.sqrt()) as f32
             };
-            let found = map(|u, v| plane(u, v) + noise(u, v)).slope(9.0, 7.0).unwrap();
+            let found = map(|u, v| plane(u, v) + noise(u, v)).slope(10.0, 7.0).unwrap();
             squares[0] += (found.mean.x - 0.3).powi(2) / found.cov.m11;
             squares[1] += (found.mean.y + 0.2).powi(2) / found.cov.m22;
         }
-        // A mean of 400 squares scatters by 7 %.
-        assert!(squares.iter().all(|sum| (0.75..1.25).contains(&(sum / f64::from(trials)))), "{squares:?}");
+        // Nine squares fill the window, at −3, 0 and 3: their slope has 0.9 of the stated variance, as 81 · 18 · 3/540² is
+        // 0.9 · 9/540. A mean of 400 squares scatters by 7 %.
+        let ratios = squares.map(|sum| sum / f64::from(trials));
+        assert!(ratios.iter().all(|ratio| (0.9 - 0.25..0.9 + 0.25).contains(ratio)), "{ratios:?}");
         let edge = map(|u, _| if u < 10 { 20.0 } else { 5.0 });
         assert_eq!(edge.slope(9.0, 8.0), None);
     }
