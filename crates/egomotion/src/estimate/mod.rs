@@ -50,6 +50,7 @@ pub use likelihood::systematic::{SystematicResponse, systematic_response};
 pub use linear::best_subset::{BestSubset, best_subset, best_subset_plain};
 pub use linear::errors_in_variables::errors_in_variables;
 pub use linear::fit::LinearFit;
+pub(crate) use linear::fit::noise_factor;
 pub use linear::least_squares::{Weighting, least_squares};
 pub use linear::lmeds::{LmedsOptions, lmeds, refit_best_subset, robust_scale};
 pub use linear::m_estimator::m_estimate;

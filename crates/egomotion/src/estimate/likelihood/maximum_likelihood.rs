@@ -147,17 +147,19 @@ pub fn maximum_likelihood<M: LikelihoodTerm>(
     if !(kernel.nu.is_finite() && kernel.fitted) {
         return found;
     }
-    let astray = match &found {
-        Ok(found) => {
-            median_square(&found.motion.phi(), &few, rig)
-                > ASTRAY_MEDIAN_RATIO * median_square(start, &few, rig)
-        }
+    let is_astray = |found: &MaximumLikelihood| {
+        median_square(&found.motion.phi(), &few, rig) > ASTRAY_MEDIAN_RATIO * median_square(start, &few, rig)
+    };
+    let again = match &found {
+        Ok(found) => is_astray(found),
         Err(why) => matches!(why, Unsolvable::NotConverged | Unsolvable::FewRows { .. }),
     };
-    if astray {
-        return maximise(observations, &few, rig, start, blocks, &StudentT { fitted: false, ..*kernel });
+    if !again {
+        return found;
     }
-    found
+    let student = maximise(observations, &few, rig, start, blocks, &StudentT { fitted: false, ..*kernel })?;
+    // Between the scene and a large body there is a motion that neither has.
+    if found.is_err() && is_astray(&student) { Err(Unsolvable::NotConverged) } else { Ok(student) }
 }
 
 /// The maximum near a start; `few` of the observations bring the iteration near its end.

@@ -18,7 +18,7 @@
 use nalgebra::{Matrix6, SMatrix, Vector6};
 use rayon::prelude::*;
 
-use super::fit::{DETERMINED_SIGMAS, NOISE_VARIANCE};
+use super::fit::{DETERMINED_SIGMAS, NOISE_VARIANCE, noise_factor};
 use crate::constrain::dcce;
 use crate::estimate::certainty::blocks::{BlockScore, Blocks};
 use crate::estimate::certainty::covariance::covariance;
@@ -151,7 +151,7 @@ fn sums(rows: &[NoisyRow], phi: &Vector6<f64>, blocks: &Blocks) -> Vec<Corrected
     let scale = scale(rows, phi);
     let cut = (OUTLIER_SIGMAS * scale.max(1.0)).powi(2);
     // Where residuals are smaller than their σ, so is the noise of the coefficients.
-    let noise_scale2 = (scale * scale).min(1.0);
+    let noise_scale2 = noise_factor(scale);
     let strips: Vec<Vec<(usize, CorrectedSums)>> = rows
         .par_chunks(STRIP)
         .map(|strip| {

@@ -15,16 +15,22 @@ use crate::geometry::{Gaussian, median};
 /// more would call weak directions unobserved, less would let noise pass for information.
 pub(super) const DETERMINED_SIGMAS: f64 = 2.5;
 /// Variance of what noise adds to the information along a direction, for each row, in units of its mean squared: 2 of
-/// a normal number's square, half as much again since rows two pixels apart share a pixel, and 5.4 since the noise is
-/// scaled by the median of the residuals, whose relative variance that is.
-pub(super) const NOISE_VARIANCE: f64 = 3.0 + 5.4;
+/// a normal number's square, and half as much again since rows two pixels apart share a pixel.
+pub(super) const NOISE_VARIANCE: f64 = 3.0;
+/// Noise is taken as stated unless most residuals have less than this share of their stated variance: nearer to it, their
+/// own scatter would decide.
+const CLEARLY_LESS_NOISE: f64 = 0.5;
 
-/// Squared scale of most residuals in units of the rows' σ², at most 1: by how much noise is less than stated.
-pub(super) fn noise_scale2<const N: usize>(rows: &[Row<N>], theta: &SVector<f64, N>) -> f64 {
+/// Factor of the stated noise variance where residuals of this scale, in units of their σ, are clearly smaller; else 1.
+pub(crate) fn noise_factor(scale: f64) -> f64 {
+    if scale * scale < CLEARLY_LESS_NOISE { scale * scale } else { 1.0 }
+}
+
+/// [`noise_factor`] of the median residual.
+fn noise_scale2<const N: usize>(rows: &[Row<N>], theta: &SVector<f64, N>) -> f64 {
     let standard = |row: &Row<N>| (row.sigma > 0.0).then(|| row.residual(theta).abs() / row.sigma);
     let middle = median(&mut rows.iter().filter_map(standard).collect::<Vec<f64>>());
-    let scale = SIGMA_PER_MEDIAN_DEVIATION * middle;
-    if scale.is_finite() { (scale * scale).min(1.0) } else { 1.0 }
+    noise_factor(SIGMA_PER_MEDIAN_DEVIATION * middle)
 }
 
 /// What a linear estimator found: θ̂, the weight it gave each row, and how well θ̂ is determined.

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::observed::Observed;
 use crate::constrain::dcce;
-use crate::estimate::MotionEstimate;
+use crate::estimate::{MotionEstimate, noise_factor};
 use crate::geometry::distribution::SIGMA_PER_MEDIAN_DEVIATION;
 use crate::geometry::{Twist, median};
 use crate::observe::{DepthChange, StereoTrack};
@@ -146,5 +146,5 @@ fn noise_share(changes: &[DepthChange], phi: &Twist, focal_px: f64) -> f64 {
         residuals.push((constraint.residual(phi) / constraint.sigma).abs());
     }
     let scale = SIGMA_PER_MEDIAN_DEVIATION * median(&mut residuals);
-    noise / square * if scale.is_finite() { (scale * scale).min(1.0) } else { 1.0 }
+    noise / square * noise_factor(scale)
 }

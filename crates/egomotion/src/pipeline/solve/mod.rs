@@ -36,7 +36,7 @@ pub fn solve(
             solver.sensor_likelihood(&observed.tracks(interval), interval.plan.source)
         }
         (Equations::FlowLikelihood, _) => solver.likelihood(&observed.flows(interval)),
-        (Equations::DepthChange, _) => solver.depth_change(&observed.depth_changes(interval)),
+        (Equations::DepthChange, _) => solver.depth_change_beyond_noise(&observed.depth_changes(interval)),
         (Equations::BinocularFlow, _) => solver.binocular(&observed.flows(interval)),
         (Equations::BinocularDisplacement, _) => solver.binocular_displacement(&observed.tracks(interval)),
         (Equations::JointFlow, _) => solver.joint(&observed.flows(interval)),

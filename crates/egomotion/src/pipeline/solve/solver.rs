@@ -135,18 +135,37 @@ impl<'a> Solver<'a> {
         if self.config.estimator == EstimatorKind::Eiv {
             return errors_in_variables(changes, self.rig, self.start, &self.blocks);
         }
-        let rows: Vec<Row<6>> = changes
-            .iter()
-            .map(|change| {
-                let constraint = dcce::constraint(change, self.rig.focal_px, self.start);
-                Row::from_constraint(&constraint, self.blocks.index(change.x_px, change.y_px))
-            })
-            .collect();
+        let rows = self.depth_change_rows(changes);
+        Ok(self.fit(&rows)?.estimate(&rows))
+    }
+
+    /// The same, without directions of which the noise of the gradients may speak alone.
+    ///
+    /// # Errors
+    /// [`Unsolvable`] when the observations do not determine a motion.
+    pub(super) fn depth_change_beyond_noise(
+        &self,
+        changes: &[DepthChange],
+    ) -> Result<MotionEstimate, Unsolvable> {
+        if self.config.estimator == EstimatorKind::Eiv {
+            return self.depth_change(changes);
+        }
+        let rows = self.depth_change_rows(changes);
         let noise = |i: usize| {
             let noise = dcce::row_noise(&changes[i], self.rig.focal_px);
             noise.fixed_view::<6, 6>(0, 0).into_owned()
         };
         Ok(self.fit(&rows)?.beyond_noise(&rows, noise)?.estimate(&rows))
+    }
+
+    fn depth_change_rows(&self, changes: &[DepthChange]) -> Vec<Row<6>> {
+        changes
+            .iter()
+            .map(|change| {
+                let constraint = dcce::constraint(change, self.rig.focal_px, self.start);
+                Row::from_constraint(&constraint, self.blocks.index(change.x_px, change.y_px))
+            })
+            .collect()
     }
 
     fn flow_rows(&self, flows: &[StereoFlow]) -> Vec<Row<6>> {
