@@ -14,9 +14,10 @@ pub const HAND_ACCELERATION_M_S2: f64 = 2.0;
 /// and fro twice a second by 5° accelerates by up to 14 rad/s².
 pub const HAND_ACCELERATION_RAD_S2: f64 = 5.0;
 
-/// Standard deviation of a read-out time, as a share of it: makes of colour cameras differ by so much.
+/// Standard deviation of a read-out time, as a share of it: a sensor's kind tells no more of its shutter.
 ///
-/// A larger share lets the bias of matching pass for a shutter where little moves.
+/// A larger share lets the bias of matching pass for a shutter where little moves; with this one the covariance of a
+/// camera with a global shutter, which was not told so, is still true.
 const READOUT_SHARE: f64 = 0.25;
 
 /// How well a sensor is known: standard deviations; 0 is exact.
