@@ -38,6 +38,16 @@ impl<'a> LinearisationPoint<'a> {
     pub(crate) fn rig(&self) -> &'a StereoRig {
         self.rig
     }
+
+    /// The motion φ, per interval.
+    pub(crate) fn phi(&self) -> &Twist {
+        &self.phi
+    }
+
+    /// What φ does to points in one interval.
+    pub(crate) fn motion(&self) -> &RigidMotion {
+        &self.motion
+    }
 }
 
 /// The misclosure e of an observation, the inverse of its covariance S, and how e changes.

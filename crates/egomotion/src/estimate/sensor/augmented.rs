@@ -1,7 +1,7 @@
 //! φ and the sensor's errors estimated together: one Gauss–Newton step, and the covariance of φ that includes them.
 //!
-//! The errors u, in units of their prior standard deviations, join φ as unknowns: with Y = (G, X) and the prior
-//! u ~ N(0, 1), (Σ w Yᵀ S⁻¹ Y + D diag(0, 1)) δ = Σ w Yᵀ S⁻¹ e − D (0, u). Observations near each other share their noise
+//! The errors u, from their prior means in units of their prior standard deviations, join φ as unknowns: with Y = (G, X)
+//! and the prior u ~ N(0, 1), (Σ w Yᵀ S⁻¹ Y + D diag(0, 1)) δ = Σ w Yᵀ S⁻¹ e − D (0, u). Observations near each other share their noise
 //! and say less than their number; D, by how much the scatter of the blocks' scores exceeds what independent rows
 //! would have, keeps them from overruling the prior (the adjustment of composite likelihoods). The covariance is the
 //! sandwich of [`covariance`] with the errors eliminated from each block's score, and the prior's own part.
@@ -9,7 +9,7 @@
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use rayon::prelude::*;
 
-use super::errors::{CALIBRATION, ERRORS, SensedTrack, SensorErrors, TrackSource};
+use super::errors::{CALIBRATION, ERRORS, SHUTTER, SensedTrack, SensorErrors, TrackSource};
 use super::tolerance::SensorPrior;
 use crate::constrain::{LinearisationPoint, Measurement};
 use crate::estimate::certainty::blocks::{BlockScore, Blocks};
@@ -50,16 +50,22 @@ pub(crate) fn augmented_step(
     blocks: &Blocks,
 ) -> Option<AugmentedStep> {
     let at = LinearisationPoint::new(found.motion.phi(), rig);
-    let sums = AugmentedSums::by_block(observations, &at, blocks, &found.residuals);
+    let sums = AugmentedSums::by_block(observations, &At { motion: at, errors }, blocks, &found.residuals);
     let by_block: Vec<AugmentedScore> = sums.iter().map(|sums| sums.score(&at, prior)).collect();
     let unit = prior.sigma.map(|sigma| if sigma > 0.0 { sigma.recip() } else { 0.0 });
-    let solved = AugmentedSolution::of(&by_block, &errors.vector().component_mul(&unit))?;
+    let solved = AugmentedSolution::of(&by_block, &(errors.vector() - prior.mean).component_mul(&unit))?;
     let moved = errors.vector() + solved.step.fixed_rows::<ERRORS>(6).component_mul(&prior.sigma);
     Some(AugmentedStep {
         step: solved.step.fixed_rows::<6>(0).into(),
         errors: SensorErrors::from_vector(&moved),
         cov: solved.covariance(&by_block)?,
     })
+}
+
+/// The motion and the errors about which observations are linearised.
+struct At<'a> {
+    motion: LinearisationPoint<'a>,
+    errors: &'a SensorErrors,
 }
 
 /// One observation at the estimate.
@@ -90,7 +96,7 @@ impl Default for AugmentedSums {
 impl AugmentedSums {
     fn by_block(
         observations: &[SensedTrack],
-        at: &LinearisationPoint<'_>,
+        at: &At<'_>,
         blocks: &Blocks,
         residuals: &ResidualModel,
     ) -> Vec<Self> {
@@ -106,7 +112,7 @@ impl AugmentedSums {
     /// One for each run of observations that lie in one block.
     fn runs(
         strip: &[SensedTrack],
-        at: &LinearisationPoint<'_>,
+        at: &At<'_>,
         blocks: &Blocks,
         residuals: &ResidualModel,
     ) -> Vec<(usize, Self)> {
@@ -124,18 +130,17 @@ impl AugmentedSums {
         runs
     }
 
-    fn add(&mut self, sensed: &SensedTrack, at: &LinearisationPoint<'_>, residuals: &ResidualModel) {
+    fn add(&mut self, sensed: &SensedTrack, at: &At<'_>, residuals: &ResidualModel) {
         // Once to move the structure to where it settles.
         let mut structure: Vector3<f64> = sensed.track.structure();
-        let _measured = sensed.track.linearise(&mut structure, at);
+        let _measured = sensed.track.linearise(&mut structure, &at.motion);
         let settled = structure;
-        let Some(l) = sensed.track.linearise(&mut structure, at) else { return };
-        let Some(calibration_jacobian) = sensed.calibration_jacobian(&settled, at) else { return };
+        let Some(l) = sensed.track.linearise(&mut structure, &at.motion) else { return };
+        let error_jacobian = sensed.error_jacobian(at.errors, &settled, &l.motion_jacobian, &at.motion);
+        let Some(error_jacobian) = error_jacobian else { return };
         let mut jacobian = SMatrix::<f64, 3, ALL>::zeros();
         jacobian.fixed_columns_mut::<6>(0).copy_from(&l.motion_jacobian);
-        jacobian.fixed_columns_mut::<CALIBRATION>(6).copy_from(&calibration_jacobian);
-        let excess_jacobian = sensed.excess_jacobian(&l.motion_jacobian, at.rig());
-        jacobian.fixed_columns_mut::<{ ERRORS - CALIBRATION }>(BASE).copy_from(&excess_jacobian);
+        jacobian.fixed_columns_mut::<ERRORS>(6).copy_from(&error_jacobian);
         let inverse_cov = l.inverse_cov / residuals.scale2;
         let q = l.e.dot(&product(&inverse_cov, &l.e));
         let (weight, slope) = residuals.mixture.weight(q);
@@ -146,7 +151,7 @@ impl AugmentedSums {
             TrackSource::Stereo => self.add_columns::<BASE>(&one, |i| i),
             TrackSource::Image => self.add_columns::<ALL>(&one, |i| i),
             TrackSource::Depth => {
-                self.add_columns::<{ BASE + 6 }>(&one, |i| if i < BASE { i } else { i + 6 })
+                self.add_columns::<{ ALL - SHUTTER }>(&one, |i| if i < BASE { i } else { i + SHUTTER })
             }
         }
     }

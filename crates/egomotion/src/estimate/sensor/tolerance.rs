@@ -14,6 +14,12 @@ pub const HAND_ACCELERATION_M_S2: f64 = 2.0;
 /// and fro twice a second by 5° accelerates by up to 14 rad/s².
 pub const HAND_ACCELERATION_RAD_S2: f64 = 5.0;
 
+/// Standard deviation of a read-out time, as a share of it: a sensor's kind tells no more of its shutter.
+///
+/// A larger share lets the bias of matching pass for a shutter where little moves; with this one the covariance of a
+/// camera with a global shutter, which was not told so, is still true.
+const READOUT_SHARE: f64 = 0.25;
+
 /// How well a sensor is known: standard deviations; 0 is exact.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(default, deny_unknown_fields)]
@@ -24,7 +30,8 @@ pub struct Tolerance {
     pub centre_px: f64,
     /// Of the scale of depth (of a stereo rig: of its baseline), as a share of it.
     pub scale: f64,
-    /// Time from an image's first row to its last, in seconds: 0 with a global shutter; depth images count as having one.
+    /// Time from an image's first row to its last, in seconds, known to a quarter of it: 0 with a global shutter; depth
+    /// images count as having one, and a stereo rig's images too.
     pub readout_s: f64,
     /// Of the time between a depth image and its image, in seconds.
     pub delay_s: f64,
@@ -52,31 +59,42 @@ impl Tolerance {
 
     /// The prior of the errors of a pair of frames that are `dt_s` seconds apart.
     pub(crate) fn prior_over(&self, dt_s: f64) -> SensorPrior {
+        // An image is read to its end before the next.
+        let readout = if dt_s > 0.0 { (self.readout_s / dt_s).min(1.0) } else { 0.0 };
         let [during, apart] = [self.readout_s, self.delay_s].map(|seconds| {
             [HAND_ACCELERATION_M_S2 * seconds * dt_s, HAND_ACCELERATION_RAD_S2 * seconds * dt_s]
         });
         let moving = |[t, omega]: [f64; 2]| Twist { t: Vector3::repeat(t), omega: Vector3::repeat(omega) };
+        let none = SensorErrors::from_vector(&SVector::zeros());
+        let mean = SensorErrors { readout, ..none };
         let sigma = SensorErrors {
             focal: self.focal,
             centre_px: (self.centre_px, self.centre_px),
             scale: self.scale,
+            readout: READOUT_SHARE * readout,
             during: moving(during),
             apart: moving(apart),
         };
-        SensorPrior { sigma: sigma.vector() }
+        SensorPrior { mean: mean.vector(), sigma: sigma.vector() }
     }
 }
 
-/// Standard deviations of the errors before anything is observed.
+/// Means and standard deviations of the errors before anything is observed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SensorPrior {
+    pub(crate) mean: SVector<f64, ERRORS>,
     pub(crate) sigma: SVector<f64, ERRORS>,
 }
 
 impl SensorPrior {
     /// Whether nothing is allowed for.
     pub(crate) fn is_exact(&self) -> bool {
-        self.sigma.amax() == 0.0
+        self.mean.amax() == 0.0 && self.sigma.amax() == 0.0
+    }
+
+    /// The errors that one expects.
+    pub(crate) fn expected(&self) -> SensorErrors {
+        SensorErrors::from_vector(&self.mean)
     }
 }
 
@@ -90,7 +108,11 @@ mod tests {
         let prior = tolerance.prior_over(0.1);
         assert!(!prior.is_exact() && Tolerance::default().prior_over(0.1).is_exact());
         // 2 m/s² and 5 rad/s² over 0.03 s change what happens in 0.1 s by 6 mm and .86°.
-        assert!((prior.sigma[4] - 0.006).abs() < 1e-12 && (prior.sigma[9] - 0.015).abs() < 1e-12);
-        assert_eq!(prior.sigma[12], 0.0);
+        assert!((prior.sigma[5] - 0.006).abs() < 1e-12 && (prior.sigma[10] - 0.015).abs() < 1e-12);
+        assert_eq!(prior.sigma[13], 0.0);
+        // Three tenths of the interval, or none, or at most all of it.
+        assert!((prior.expected().readout - 0.3).abs() < 1e-12 && (prior.sigma[4] - 0.075).abs() < 1e-12);
+        assert_eq!(Tolerance::rendered().prior_over(0.1).expected().vector().amax(), 0.0);
+        assert_eq!(tolerance.prior_over(0.01).expected().readout, 1.0);
     }
 }

@@ -9,6 +9,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::solver::{SETTLED_SIGMAS, Solver};
+use crate::constrain::LinearisationPoint;
 use crate::estimate::MaximumLikelihoodOptions;
 use crate::estimate::StudentT;
 use crate::estimate::{MotionEstimate, Unsolvable};
@@ -47,7 +48,7 @@ pub(super) fn solve_with_shape(
     let tracked = Tracked { flow: pair.every(config.sample_step_px, DensePair::stereo_track), corners };
     let mut phi = start.copied().unwrap_or_else(Twist::zero);
     let mut reach = if start.is_some() { LAST_REACH_PX } else { FIRST_REACH_PX };
-    let mut errors = SensorErrors::none();
+    let mut errors = interval.config.tolerance.prior_over(interval.dt_s).expected();
     let mut round = 0;
     loop {
         let near = reach <= LAST_REACH_PX;
@@ -87,8 +88,9 @@ fn observations(
     reach_px: f64,
     config: &Config,
 ) -> Vec<SensedTrack> {
-    let (rig, motion, seen_by_depth) = (pair.rig, &phi.exp(), errors.apart.exp().after(&phi.exp()));
-    let corrected = |track: StereoTrack, source| errors.corrected(&SensedTrack { track, source }, rig);
+    let (rig, at) = (pair.rig, LinearisationPoint::new(*phi, pair.rig));
+    let (motion, seen_by_depth) = (at.motion(), errors.apart.exp().after(at.motion()));
+    let corrected = |track: StereoTrack, source| errors.corrected(&SensedTrack::new(track, source, rig), &at);
     let shapes = pair.every(config.sample_step_px, |pair, u, v| {
         let track = pair.shape_track(u, v, &seen_by_depth, reach_px)?;
         Some((corrected(track, TrackSource::Depth), pair.flow.get(u, v).is_some()))

@@ -1,7 +1,7 @@
 //! The methods on observations at hand, each with the configured estimator.
 
 use crate::constrain::displacement::{self, DisplacementConstraints};
-use crate::constrain::{LinearConstraint, binocular_flow, dcce, image_flow};
+use crate::constrain::{LinearConstraint, LinearisationPoint, binocular_flow, dcce, image_flow};
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
 use crate::estimate::{
     Blocks, LikelihoodTerm, LinearFit, LmedsOptions, MaximumLikelihood, MotionEstimate, Row, SensedTrack,
@@ -87,12 +87,12 @@ impl<'a> Solver<'a> {
         if self.prior.is_exact() {
             return self.likelihood(tracks);
         }
-        let (mut errors, mut start) = (SensorErrors::none(), *self.start);
+        let (mut errors, mut start) = (self.prior.expected(), *self.start);
         let mut round = 0;
         loop {
-            let made = tracks.iter().map(|&track| SensedTrack { track, source });
-            let corrected: Vec<SensedTrack> =
-                made.map(|sensed| errors.corrected(&sensed, self.rig)).collect();
+            let at = LinearisationPoint::new(start, self.rig);
+            let made = tracks.iter().map(|&track| SensedTrack::new(track, source, self.rig));
+            let corrected: Vec<SensedTrack> = made.map(|sensed| errors.corrected(&sensed, &at)).collect();
             let found = Solver { start: &start, ..*self }.round(&corrected, &mut errors)?;
             let moved = found.moved_from(&start);
             start = found.phi();
