@@ -12,6 +12,7 @@ mod evaluate;
 mod frame_motion;
 mod front_end;
 mod geometry;
+mod motion;
 mod observations;
 mod pipeline;
 mod recording;
@@ -43,6 +44,8 @@ mod _native {
     use crate::front_end::{disparity, flow, track};
     #[pymodule_export]
     use crate::geometry::{exp, image_flow, instantaneous, log, rotation_and_u, seen_from, velocity};
+    #[pymodule_export]
+    use crate::motion::{rotation_left_out, scaled_depth};
     #[pymodule_export]
     use crate::observations::{
         DepthChanges, DepthFlows, DepthTracks, StereoFlows, StereoTracks, exact_depth_change,

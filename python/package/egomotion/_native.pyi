@@ -57,7 +57,9 @@ __all__ = [
     "maximum_likelihood",
     "robust_scale",
     "rotation_and_u",
+    "rotation_left_out",
     "run",
+    "scaled_depth",
     "seen_from",
     "sequences",
     "simulate",
@@ -577,6 +579,14 @@ def maximum_likelihood(
 ) -> tuple[Estimate, float]: ...
 def robust_scale(median_square: float, residuals: int, unknowns: int) -> float: ...
 def rotation_and_u(phi: npt.ArrayLike, dt: float = 1.0) -> tuple[_F64, _F64]: ...
+def rotation_left_out(
+    points: npt.ArrayLike,
+    phi: npt.ArrayLike,
+    *,
+    depth_sigma: npt.ArrayLike | None = None,
+    phi_cov: npt.ArrayLike | None = None,
+    dt_s: float = 1.0,
+) -> tuple[_F64, _F64]: ...
 def run(
     path: _Path,
     *,
@@ -594,6 +604,14 @@ def run(
     threads: int | None = None,
     **settings: Any,
 ) -> Run: ...
+def scaled_depth(
+    points: npt.ArrayLike,
+    phi: npt.ArrayLike,
+    *,
+    depth_sigma: npt.ArrayLike | None = None,
+    phi_cov: npt.ArrayLike | None = None,
+    dt_s: float = 1.0,
+) -> tuple[_F64, _F64]: ...
 def sequences(path: _Path, *, calibration: _Path | None = None) -> list[str]: ...
 def seen_from(phi: npt.ArrayLike, centre: npt.ArrayLike) -> _F64: ...
 def simulate(
