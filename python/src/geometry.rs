@@ -1,8 +1,8 @@
 //! Twists φ and rigid motions, as vectors and matrices.
 
-use egomotion::geometry::{RigidMotion, Twist};
-use nalgebra::Matrix3;
-use numpy::{PyArray1, PyArray2};
+use egomotion::geometry::{Gaussian, RigidMotion, Twist};
+use nalgebra::{Matrix3, Matrix6, Vector6};
+use numpy::{PyArray1, PyArray2, PyArrayMethods as _};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -115,4 +115,65 @@ pub fn image_flow<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (phi, points) = (twist("phi", phi)?, arrays::rows::<3>("xy_depth", xy_depth)?);
     arrays::table(py, points.iter().map(|p| egomotion::geometry::image_flow(&phi, p.x, p.y, p.z, focal_px)))
+}
+
+/// Image velocity (n, 2) in pixels of points (X, Y, Z) (n, 3) that move with velocities (n, 3), both in metres, (2).
+#[pyfunction]
+pub fn image_velocity<'py>(
+    py: Python<'py>,
+    points: &Bound<'py, PyAny>,
+    velocities: &Bound<'py, PyAny>,
+    focal_px: f64,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (points, velocities) =
+        (arrays::rows::<3>("points", points)?, arrays::rows::<3>("velocities", velocities)?);
+    arrays::same_length("velocities", velocities.len(), points.len())?;
+    let both = points.iter().zip(&velocities);
+    arrays::table(py, both.map(|(p, v)| egomotion::geometry::image_velocity(p, v, focal_px)))
+}
+
+/// Most quantities that [`propagate_covariance`] takes and gives: the six components of φ.
+const MAX_QUANTITIES: usize = 6;
+
+/// Covariance (m, m) of m quantities whose Jacobian (m, n) by n quantities with covariance (n, n) is known, J Σ Jᵀ (30);
+/// m and n are at most 6.
+#[pyfunction]
+pub fn propagate_covariance<'py>(
+    py: Python<'py>,
+    jacobian: &Bound<'py, PyAny>,
+    covariance: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let ((m, n), jacobian) = small_matrix("jacobian", jacobian)?;
+    let (shape, cov) = small_matrix("covariance", covariance)?;
+    if shape != (n, n) {
+        let words =
+            format!("covariance has shape {shape:?}; give ({n}, {n}), as the jacobian has {n} columns");
+        return Err(PyValueError::new_err(words));
+    }
+    // Beyond their shape both are zero, and so nothing is added.
+    let found = Gaussian { mean: Vector6::zeros(), cov }.propagate(Vector6::zeros(), &jacobian);
+    let corner = (0..m * m).map(|i| found.cov[(i / m, i % m)]);
+    PyArray1::from_iter(py, corner).reshape([m, m])
+}
+
+/// The shape of a matrix of at most six rows and columns, and its numbers, followed by zeros.
+fn small_matrix(name: &str, argument: &Bound<'_, PyAny>) -> PyResult<((usize, usize), Matrix6<f64>)> {
+    arrays::numbers(name, argument, |shape, values| match *shape {
+        [rows @ 1..=MAX_QUANTITIES, columns @ 1..=MAX_QUANTITIES] => {
+            let at = |i: usize, j: usize| if i < rows && j < columns { values[i * columns + j] } else { 0.0 };
+            Ok(((rows, columns), Matrix6::from_fn(at)))
+        }
+        _ => {
+            let words = format!(
+                "{name} has shape {shape:?}; give a matrix of at most {MAX_QUANTITIES} rows and columns"
+            );
+            Err(PyValueError::new_err(words))
+        }
+    })
+}
+
+/// Variance of a quantity that is rounded to multiples of `step`, step²/12, (52).
+#[pyfunction]
+pub fn rounding_variance(step: f64) -> f64 {
+    egomotion::geometry::rounding_variance(step)
 }

@@ -12,6 +12,8 @@ mod evaluate;
 mod frame_motion;
 mod front_end;
 mod geometry;
+mod metrics;
+mod motion;
 mod observations;
 mod pipeline;
 mod recording;
@@ -32,7 +34,7 @@ mod _native {
     use crate::error::{FileError, Unsolvable};
     #[pymodule_export]
     use crate::estimators::{
-        Estimate, align, align_phi, cramer_rao_bound, errors_in_variables, irls, least_squares, lmeds,
+        Estimate, align, align_phi, cramer_rao_bound, errors_in_variables, irls, joint, least_squares, lmeds,
         lmeds_search, lmeds_trials, maximum_likelihood, robust_scale, two_step,
     };
     #[pymodule_export]
@@ -42,7 +44,14 @@ mod _native {
     #[pymodule_export]
     use crate::front_end::{disparity, flow, track};
     #[pymodule_export]
-    use crate::geometry::{exp, image_flow, instantaneous, log, rotation_and_u, seen_from, velocity};
+    use crate::geometry::{
+        exp, image_flow, image_velocity, instantaneous, log, propagate_covariance, rotation_and_u,
+        rounding_variance, seen_from, velocity,
+    };
+    #[pymodule_export]
+    use crate::metrics::section_seven;
+    #[pymodule_export]
+    use crate::motion::{rotation_left_out, scaled_depth};
     #[pymodule_export]
     use crate::observations::{
         DepthChanges, DepthFlows, DepthTracks, StereoFlows, StereoTracks, exact_depth_change,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use egomotion::geometry::RigCamera;
 use egomotion::metrics;
 use egomotion::pipeline::DenseResults;
 use egomotion::pipeline::{Config, StereoFrame, Unanswered};
@@ -16,7 +17,7 @@ use crate::args::DemoArgs;
 use crate::exit::Ending;
 use crate::process::set_threads;
 use crate::results::verdict::MapErrors;
-use crate::results::{ResultFolder, RunDescription, Summary, status, write_motion, write_report};
+use crate::results::{ResultFolder, RunDescription, Summary, Viewpoint, status, write_motion, write_report};
 use crate::session::{FrameResult, Outcome, Session};
 use crate::terminal::{self, frames_bar, stop_signal};
 
@@ -65,8 +66,9 @@ pub fn demo(args: &DemoArgs) -> Result<Ending> {
             Ok(())
         },
     )?;
-    write_motion(&folder, &config, &outcome, false)?;
-    let mut summary = Summary::new("demo".into(), sequence.rig, &config, &outcome);
+    let viewpoint = Viewpoint { rig: &sequence.rig, camera: RigCamera::Left };
+    write_motion(&folder, &config, &outcome, viewpoint, false)?;
+    let mut summary = Summary::new("demo".into(), viewpoint, &config, &outcome);
     summary.truth_maps = errors.maps.verdict();
     folder.write_json("summary.json", &summary)?;
     let description = RunDescription {

@@ -199,6 +199,13 @@ fn depth_velocity_discrete() {
         near(computed.variance(), get("var_corr"), EXACT);
         let printed = vz::dcce_discrete_variance_as_printed(&track, bf);
         near(printed, get("var_paper47_with_d_d1_dt_d2minusd1_sdd1_sdt2sdd"), EXACT);
+        // (53) adds up the same variance where the ends are alike and gradients have half of theirs.
+        let (disparity, velocity) = vz::dcce_discrete_coefficients(&track, bf);
+        let (sdd, svv) = (get("sdd1"), get("sxx") + get("sx1x1"));
+        let halved = [sdd, sdd, 0.5 * sdd, 0.5 * sdd];
+        let alike = Gaussian::independent(track.disparity.mean.into(), halved);
+        let printed = vz::dcce_discrete_variance_as_printed(&DepthTrack { disparity: alike, ..track }, bf);
+        near(disparity * sdd + velocity * svv, printed, EXACT);
     }
     for case in all["vz"]["dv_disc"].as_array().unwrap() {
         let get = |k: &str| num(&case[k]);
@@ -207,6 +214,10 @@ fn depth_velocity_discrete() {
         near(vz::dv_discrete(&track, bf).vz().value(), get("VZ"), EXACT);
         near(vz::dv_discrete(&track, bf).vz().variance(), get("var50"), EXACT);
         near(vz::dv_discrete_variance_as_printed(&track, bf), get("var49"), EXACT);
+        let (disparity, velocity) = vz::dv_discrete_coefficients(&track, bf);
+        let slopes = [get("d"), get("d1")].map(|d| (bf / (d * d)).powi(2));
+        near(disparity, slopes[0] + slopes[1], EXACT);
+        assert_eq!(velocity, 0.0);
         // The discrete DV is the differential one on the discrete flow.
         let flow = track.discrete_flow();
         near(vz::dv(&flow, bf).vz().value(), get("VZ"), EXACT);

@@ -7,7 +7,9 @@ use egomotion::estimate::{
     LikelihoodTerm, Row, StudentT, Weighting, least_squares, m_estimate, maximum_likelihood,
 };
 use egomotion::geometry::{CayleyMotion, Gaussian, RigidMotion, Twist};
-use egomotion::motion::{DepthVelocity, DisparityOffset, RigidPrediction, depth_velocity as vz};
+use egomotion::motion::{
+    DepthVelocity, DisparityOffset, RigidPrediction, depth_velocity as vz, rotation_left_out, scaled_depth,
+};
 use egomotion::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector4, Vector6};
 use rand::RngExt;
@@ -337,6 +339,33 @@ fn variance_of_looming() {
         let got = DepthVelocity::from_disparities(&disparities, bf).looming(dt).unwrap();
         assert!((got.value() - of(&disparities.mean)[0]).abs() < 1e-12 / dt);
         close_cov(&got.cov, &propagated(of, &disparities, 1e-3), EXACT);
+    }
+}
+
+#[test]
+fn variances_of_scaled_depth_and_of_its_error() {
+    let (rig, dt, mut rng) = (rig(), 0.1, random(12));
+    // Everything in the image approaches, at 0.2 to 0.4 m an interval.
+    let mean = Vector6::new(0.06, -0.045, -0.3, 0.01, -0.015, 0.005);
+    for xyd in places(20, &mut rng) {
+        let (point, z_variance) = (rig.point(&xyd).unwrap(), 0.04);
+        let motion = Gaussian { mean, cov: correlated::<6>(0.003, &mut rng) };
+        let raw: Gaussian<7> = joined(&Gaussian::scalar(point.z, z_variance), &motion);
+        let scaled = |m: &SVector<f64, 7>| SVector::<f64, 1>::new(-m[3] / (m[0] * dt));
+        // The depth's rate under the exact motion, by differences, of a point that noise moves along its ray.
+        let error = |m: &SVector<f64, 7>| {
+            let (p, phi) = (point * (m[0] / point.z), Twist::from_vector(&m.fixed_rows::<6>(1).into()));
+            let z_after =
+                |time: &SVector<f64, 1>| SVector::<f64, 1>::new(phi.scaled(time[0]).exp().apply(&p).z);
+            let vz = numeric(z_after, &SVector::<f64, 1>::zeros(), 1e-3)[0];
+            SVector::<f64, 1>::new(scaled(m)[0].recip() + dt * p.z / vz)
+        };
+        let found = scaled_depth(&point, z_variance, &motion, dt).unwrap().looming;
+        assert!((found.value() - scaled(&raw.mean)[0]).abs() < 1e-12);
+        close_cov(&found.cov, &propagated(scaled, &raw, 1e-3), EXACT);
+        let found = rotation_left_out(&point, z_variance, &motion, dt).unwrap();
+        assert!((found.value() - error(&raw.mean)[0]).abs() < 1e-8);
+        close_cov(&found.cov, &propagated(error, &raw, 1e-4), 1e-6);
     }
 }
 

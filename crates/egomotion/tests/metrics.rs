@@ -89,8 +89,10 @@ fn section_seven_by_hand() {
     let figures = SectionSeven::of(&pairs).unwrap();
     assert_relative_eq!(figures.erm_signed_percent.unwrap(), 10.0, max_relative = 1e-12);
     assert_relative_eq!(figures.erm_abs_percent.unwrap(), 70.0 / 3.0, max_relative = 1e-12);
+    assert_relative_eq!(figures.erm_median_percent.unwrap(), 20.0, max_relative = 1e-12);
     assert_relative_eq!(figures.std_percent.unwrap(), 30.0, max_relative = 1e-12);
     assert_relative_eq!(figures.eam, (0.1 + 0.4 + 0.4 + 0.4) / 4.0, max_relative = 1e-12);
+    assert_relative_eq!(figures.eam_median, 0.4, max_relative = 1e-12);
     assert_eq!((figures.count, figures.relative_count), (4, 3));
 
     let at_rest = SectionSeven::of(&[(0.3, 0.0), (-0.1, 0.0)]).unwrap();

@@ -1,9 +1,14 @@
 //! What an estimator answers.
 
-use egomotion::estimate;
+use std::any::Any;
+
+use egomotion::estimate::{self, MotionEstimate};
 use nalgebra::SVector;
 use numpy::{PyArray1, PyArray2, PyArrayMethods as _};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+
+use crate::arrays;
 
 /// An estimate of k unknowns: its value, its covariance, and what could not be determined.
 #[pyclass(module = "egomotion", frozen)]
@@ -18,6 +23,8 @@ pub struct Estimate {
     inliers: usize,
     residual_scale: f64,
     weights: Option<Vec<f64>>,
+    /// The same, if it is one of six unknowns.
+    motion: Option<MotionEstimate>,
 }
 
 impl Estimate {
@@ -33,6 +40,7 @@ impl Estimate {
             inliers: found.inliers,
             residual_scale: found.residual_scale,
             weights: None,
+            motion: (found as &dyn Any).downcast_ref::<MotionEstimate>().copied(),
         }
     }
 
@@ -115,6 +123,17 @@ impl Estimate {
     #[getter]
     fn weights<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
         self.weights.as_deref().map(|weights| PyArray1::from_slice(py, weights))
+    }
+
+    /// The same motion φ and its covariance for a parallel camera centred at `centre` (3,) in metres, (4): the right camera of
+    /// a rig is at (baseline, 0, 0), the cyclopean one half-way. An estimate of other unknowns than φ is refused.
+    fn seen_from(&self, centre: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let centre = arrays::one::<3>("centre", centre)?;
+        let motion = self.motion.as_ref().ok_or_else(|| {
+            let words = format!("an estimate of {} unknowns is no motion; give one of six", self.theta.len());
+            PyValueError::new_err(words)
+        })?;
+        Ok(Self { weights: self.weights.clone(), ..Self::of(&motion.seen_from(&centre)) })
     }
 
     fn __repr__(&self) -> String {

@@ -2,6 +2,8 @@
 
 use egomotion::estimate::{self, Blocks, LinearFit, LmedsOptions, Row, Unsolvable, Weighting, m_estimate};
 use egomotion::geometry::Twist;
+use egomotion::pipeline::solve::Solver;
+use egomotion::pipeline::{Config, EstimatorKind, Method};
 use nalgebra::SVector;
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
@@ -11,7 +13,7 @@ use super::{Estimate, Robustness, student_t};
 use crate::arrays;
 use crate::error::unsolvable;
 use crate::geometry::twist;
-use crate::observations::DepthChanges;
+use crate::observations::{DepthChanges, StereoFlows};
 use crate::rig::Rig;
 use crate::rows::{MAX_UNKNOWNS, Rows, with_unknowns};
 
@@ -159,6 +161,33 @@ pub fn two_step(py: Python<'_>, dv: &Rows, flow: &Rows, estimator: &str) -> PyRe
         Robustness::LeastSquares => estimate::least_squares(rows, Weighting::Unit),
     };
     let found = py.detach(|| estimate::two_step(&dv.to(), &flow.to(), solve));
+    Ok(Estimate::of(&found.map_err(unsolvable)?))
+}
+
+/// φ by binocular flow (13) and image flow (3) solved at once, each row in units of its σ at the motion `start` (6,): the method
+/// joint, with `estimator` "irls", "ls" or "lmeds".
+#[pyfunction]
+#[pyo3(signature = (flows, rig, *, start = None, estimator = "irls", block_px = 48.0))]
+pub fn joint(
+    py: Python<'_>,
+    flows: &StereoFlows,
+    rig: &Rig,
+    start: Option<&Bound<'_, PyAny>>,
+    estimator: &str,
+    block_px: f64,
+) -> PyResult<Estimate> {
+    let start = start.map_or_else(|| Ok(Twist::zero()), |start| twist("start", start))?;
+    let estimator = match estimator {
+        "irls" => EstimatorKind::Irls,
+        "ls" => EstimatorKind::Ls,
+        "lmeds" => EstimatorKind::Lmeds,
+        other => {
+            let words = format!("estimator {other:?} is not known; give 'irls', 'ls' or 'lmeds'");
+            return Err(PyValueError::new_err(words));
+        }
+    };
+    let config = Config { method: Method::Joint, estimator, block_px, ..Config::default() };
+    let found = py.detach(|| Solver::new(&rig.0, &start, &config).joint(&flows.0));
     Ok(Estimate::of(&found.map_err(unsolvable)?))
 }
 

@@ -13,7 +13,8 @@ pub use alignment::{align, align_phi};
 pub use estimate::Estimate;
 pub use likelihood::{cramer_rao_bound, maximum_likelihood};
 pub use linear::{
-    errors_in_variables, irls, least_squares, lmeds, lmeds_search, lmeds_trials, robust_scale, two_step,
+    errors_in_variables, irls, joint, least_squares, lmeds, lmeds_search, lmeds_trials, robust_scale,
+    two_step,
 };
 
 /// Student's t with `nu` degrees of freedom; by default that of the pipeline.

@@ -240,6 +240,12 @@ impl DepthTracks {
         each(py, &self.0, |track| vz::dcce_discrete_variance_as_printed(track, bf))
     }
 
+    /// Coefficients (n, 2) of σ²_d and of σ²_v in the variance of (17) as printed in (47), (53); d_t has 2 σ²_d.
+    fn coefficients<'py>(&self, py: Python<'py>, rig: &Rig) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let bf = rig.0.depth_disparity_product();
+        coefficients(py, &self.0, |track| vz::dcce_discrete_coefficients(track, bf))
+    }
+
     fn __len__(&self) -> usize {
         self.0.len()
     }

@@ -161,6 +161,12 @@ impl StereoTracks {
         each(py, &self.0, |track| vz::dv_discrete_variance_as_printed(track, bf))
     }
 
+    /// Coefficients (n, 2) of σ²_d and of σ²_v in the variance of (21), (53); the second is 0.
+    fn coefficients<'py>(&self, py: Python<'py>, rig: &Rig) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let bf = rig.0.depth_disparity_product();
+        coefficients(py, &self.0, |track| vz::dv_discrete_coefficients(track, bf))
+    }
+
     /// The finite displacements as flow, (19) and (20): with it (9) gives (21).
     fn discrete_flow(&self, py: Python<'_>) -> StereoFlows {
         StereoFlows(py.detach(|| self.0.par_iter().map(StereoTrack::discrete_flow).collect()))

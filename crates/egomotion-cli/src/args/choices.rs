@@ -1,6 +1,7 @@
 //! Choices of the libraries and of the results, as words of the command line.
 
 use clap::ValueEnum;
+use egomotion::geometry::RigCamera;
 use egomotion::pipeline::{Approach, EstimatorKind, Method, Observe};
 use egomotion_io::recording::Sensor;
 use serde::Serialize;
@@ -42,6 +43,11 @@ choice!(EstimatorArg for EstimatorKind {
 choice!(ObserveArg for Observe {
     Dense: "Disparity and flow of every pixel, with all maps.",
     Sparse: "Tracked corners alone.",
+});
+choice!(FrameArg for RigCamera {
+    Left: "The left camera.",
+    Right: "The right camera.",
+    Cyclopean: "The camera in the middle between the two.",
 });
 choice!(SensorArg for Sensor {
     Stereo: "Left and right images.",

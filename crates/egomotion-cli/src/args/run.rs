@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::{Serialize, Serializer};
 
-use super::choices::{ApproachArg, CloudArg, EstimatorArg, MapFormatArg, MethodArg, ObserveArg, SensorArg};
+use super::choices::{
+    ApproachArg, CloudArg, EstimatorArg, FrameArg, MapFormatArg, MethodArg, ObserveArg, SensorArg,
+};
 use super::values::{frame_size, positive, rate};
 
 // What is serialised is `options` of `summary.json`, and must be alike when a run goes on. The rest is in `Config`, or
@@ -38,6 +40,10 @@ pub struct RunArgs {
     /// Which camera to use where a source has both [default: stereo].
     #[arg(long, value_enum)]
     pub sensor: Option<SensorArg>,
+    /// Camera whose φ and covariance motion.csv and JSON lines give; trajectories, maps and moving.csv stay those of
+    /// the left camera [default: left].
+    #[arg(long, value_enum, value_name = "CAMERA")]
+    pub frame: Option<FrameArg>,
     /// Folder of disparity maps in place of our own: PFM, .npy or KITTI PNG, named as the left images or by number.
     #[arg(long, value_name = "DIR")]
     #[serde(serialize_with = "place")]

@@ -13,7 +13,7 @@ mod summary;
 pub mod verdict;
 
 pub use folder::ResultFolder;
-pub use motion::{motion_row, status, write_motion, write_rows};
+pub use motion::{Viewpoint, motion_row, status, write_motion, write_rows};
 pub use pair_summary::{NO_MOTION, PairIndex, PairSummary};
 pub use report::{RunDescription, write_index, write_report};
 pub use scene_index::{SceneEntry, SceneIndex};

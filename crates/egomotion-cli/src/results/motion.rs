@@ -1,6 +1,8 @@
 //! The trajectory in all formats, and `motion.csv`: one row for each frame from the second on.
 
 use anyhow::Result;
+use egomotion::estimate::MotionEstimate;
+use egomotion::geometry::{RigCamera, StereoRig};
 use egomotion::pipeline::{Config, Observe};
 use egomotion_io::motion_table::{self, EstimatedMotion, MotionRow};
 use egomotion_io::trajectory::{Pose, write_euroc, write_kitti, write_tum};
@@ -9,14 +11,38 @@ use super::folder::ResultFolder;
 use super::moving;
 use crate::session::{FrameResult, Outcome};
 
+/// A camera of a rig, in whose frame φ is written.
+#[derive(Debug, Clone, Copy)]
+pub struct Viewpoint<'a> {
+    pub rig: &'a StereoRig,
+    pub camera: RigCamera,
+}
+
+impl Viewpoint<'_> {
+    /// The same motion and covariance in the frame of this camera, (4).
+    fn of(&self, estimate: &MotionEstimate) -> MotionEstimate {
+        match self.camera {
+            RigCamera::Left => *estimate,
+            camera => estimate.seen_from(&self.rig.centre_from_left(camera)),
+        }
+    }
+}
+
 /// Write the trajectory, `motion.csv`, and where every pixel was seen `moving.csv`; with `parquet` that too.
-pub fn write_motion(folder: &ResultFolder, config: &Config, outcome: &Outcome, parquet: bool) -> Result<()> {
+pub fn write_motion(
+    folder: &ResultFolder,
+    config: &Config,
+    outcome: &Outcome,
+    viewpoint: Viewpoint<'_>,
+    parquet: bool,
+) -> Result<()> {
     write_trajectory(folder, outcome)?;
     if config.observe == Observe::Dense {
         folder.write("moving.csv", moving::table(&outcome.frames)?.as_bytes())?;
     }
     // The first frame has no motion.
-    let rows: Vec<MotionRow> = outcome.frames.iter().skip(1).map(motion_row).collect();
+    let rows: Vec<MotionRow> =
+        outcome.frames.iter().skip(1).map(|frame| motion_row(frame, viewpoint)).collect();
     write_rows(folder, &rows, parquet)
 }
 
@@ -49,14 +75,14 @@ pub fn write_rows(folder: &ResultFolder, rows: &[MotionRow], parquet: bool) -> R
 }
 
 /// A row of `motion.csv`.
-pub fn motion_row(frame: &FrameResult) -> MotionRow {
+pub fn motion_row(frame: &FrameResult, viewpoint: Viewpoint<'_>) -> MotionRow {
     let motion = &frame.motion;
     let impact = motion.impact();
     MotionRow {
         frame: frame.index,
         time_s: motion.time_s,
         dt_s: motion.dt_s,
-        motion: motion.motion.as_ref().ok().map(|estimate| EstimatedMotion {
+        motion: motion.motion.as_ref().ok().map(|left| viewpoint.of(left)).map(|estimate| EstimatedMotion {
             phi: estimate.theta,
             observed: estimate.observed,
             rows: estimate.rows,

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use egomotion::geometry::{StereoRectification, StereoRig};
+use egomotion::geometry::{RigCamera, StereoRectification, StereoRig};
 use egomotion::pipeline::Config;
 use egomotion::pipeline::solve::Contradiction;
 use egomotion_io::source::{DepthSensor, Sequence};
 use serde::Serialize;
 use serde_json::Value;
 
-use super::motion::status;
+use super::motion::{Viewpoint, status};
 use super::verdict::{MapVerdict, MotionVerdict};
 use crate::session::Outcome;
 
@@ -46,6 +46,8 @@ pub struct Summary {
     /// Whether every frame was done.
     pub complete: bool,
     pub rig: StereoRig,
+    /// Camera whose φ `motion.csv` gives.
+    pub frame: RigCamera,
     /// What the rig was made of.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cameras: Option<Cameras>,
@@ -101,7 +103,17 @@ impl Summary {
         ["ok", "partial"].iter().filter_map(|status| self.counts.get(*status)).sum()
     }
 
-    pub fn new(source: String, rig: StereoRig, config: &Config, outcome: &Outcome) -> Self {
+    /// That `motion.csv` is not of the camera that the report is of.
+    pub fn camera_note(&self) -> Option<String> {
+        let camera = match self.frame {
+            RigCamera::Left => return None,
+            RigCamera::Right => "right",
+            RigCamera::Cyclopean => "cyclopean",
+        };
+        Some(format!("φ on this page is that of the left camera; motion.csv has the {camera} camera's."))
+    }
+
+    pub fn new(source: String, viewpoint: Viewpoint<'_>, config: &Config, outcome: &Outcome) -> Self {
         let (mut counts, mut no_obstacle) = (StatusCounts::new(), BTreeMap::new());
         for frame in outcome.frames.iter().skip(1) {
             *counts.entry(status(frame).to_owned()).or_insert(0) += 1;
@@ -118,7 +130,8 @@ impl Summary {
             source,
             frames: outcome.frames.len(),
             complete: outcome.complete,
-            rig,
+            rig: *viewpoint.rig,
+            frame: viewpoint.camera,
             cameras: None,
             options: None,
             seed: config.seed,

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use egomotion::geometry::RigCamera;
 use egomotion::pipeline::{Config, Observe};
 use egomotion_io::recording::{RecordingOptions, Sensor};
 use egomotion_io::stream::StreamFormat;
@@ -30,6 +31,8 @@ pub struct RunPlan {
     pub maps: MapFiles,
     /// Formats of the disparity of a pair that has no second time.
     pub pair_formats: Vec<MapFormat>,
+    /// Camera whose φ is written.
+    pub camera: RigCamera,
     /// Whether `motion.parquet` is written too.
     pub parquet: bool,
     /// Worker threads; all cores if `None`.
@@ -111,6 +114,7 @@ impl RunPlan {
             config,
             maps,
             pair_formats: pair_formats(args),
+            camera: args.frame.map_or(RigCamera::Left, RigCamera::from),
             parquet: args.parquet,
             threads: args.threads,
             resume: args.resume,

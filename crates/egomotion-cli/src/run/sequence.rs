@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use anyhow::Result;
+use egomotion::geometry::RigCamera;
 use egomotion::pipeline::{Config, Unanswered};
 use egomotion_io::recording::Recording;
 use egomotion_io::source::Sequence;
@@ -13,7 +14,7 @@ use super::plan::{RecordingInput, RunPlan, checked};
 use super::resume::{RunIdentity, open_log};
 use crate::exit::{UsageError, choice_error};
 use crate::results::verdict::{MapVerdict, scene_maps};
-use crate::results::{Cameras, ResultFolder, RunDescription, Summary, write_motion, write_report};
+use crate::results::{Cameras, ResultFolder, RunDescription, Summary, Viewpoint, write_motion, write_report};
 use crate::session::{FrameResult, Outcome, RunLog, Session};
 use crate::terminal::{self, frames_bar};
 
@@ -67,6 +68,12 @@ impl SequenceRun<'_> {
         if recording.is_of_tracks() && self.plan.maps.any() {
             return Err(UsageError("--maps need images, not tracks".into()).into());
         }
+        if recording.is_of_depth() && self.plan.camera != RigCamera::Left {
+            return Err(UsageError(
+                "a depth camera has no other beside it: --frame can be left alone".into(),
+            )
+            .into());
+        }
         Ok(Opened { recording, config, folder: ResultFolder::create(self.out)? })
     }
 
@@ -75,7 +82,7 @@ impl SequenceRun<'_> {
         let log = outcome.log.take();
         let mut summary = Summary::new(
             self.input.path.display().to_string(),
-            opened.recording.rig,
+            self.viewpoint(opened),
             &opened.config,
             &outcome,
         );
@@ -92,6 +99,11 @@ impl SequenceRun<'_> {
             None => {}
         }
         Ok(DoneSequence { summary, first_failure: first_failure(&outcome.frames) })
+    }
+
+    /// The camera whose φ is written.
+    fn viewpoint<'a>(&self, opened: &'a Opened) -> Viewpoint<'a> {
+        Viewpoint { rig: &opened.recording.rig, camera: self.plan.camera }
     }
 
     /// Every frame through the pipeline; maps are written as they come, and judged where the source knows their truth.
@@ -131,7 +143,7 @@ impl SequenceRun<'_> {
     /// The files of the whole sequence.
     fn write(&self, opened: &Opened, summary: &Summary, outcome: &Outcome) -> Result<()> {
         let (folder, name) = (&opened.folder, &self.sequence.name);
-        write_motion(folder, &opened.config, outcome, self.plan.parquet)?;
+        write_motion(folder, &opened.config, outcome, self.viewpoint(opened), self.plan.parquet)?;
         for warning in &summary.warnings {
             terminal::tell(format_args!("{name}: warning: {warning}"));
         }
@@ -173,6 +185,7 @@ fn notes(summary: &Summary) -> Vec<String> {
                 .into(),
         );
     }
+    notes.extend(summary.camera_note());
     notes.extend(summary.warnings.iter().cloned());
     notes
 }

@@ -17,7 +17,9 @@ use serde_json::{Value, json};
 
 use super::plan::{RunPlan, StreamInput};
 use crate::exit::Ending;
-use crate::results::{ResultFolder, RunDescription, Summary, motion_row, write_motion, write_report};
+use crate::results::{
+    ResultFolder, RunDescription, Summary, Viewpoint, motion_row, write_motion, write_report,
+};
 use crate::session::{FrameResult, Outcome, Session};
 use crate::terminal::{self, frames_bar, stop_signal};
 
@@ -48,13 +50,14 @@ pub fn run(plan: &RunPlan, input: &StreamInput) -> Result<Ending> {
         rectifier,
         rate_hz: input.rate_hz,
     };
+    let viewpoint = Viewpoint { rig: &pair.rig, camera: plan.camera };
     let outcome = session.run(
         None,
         &stop_signal("frame"),
         |k| frames.fetch(k),
         |frame| {
             let mut stdout = terminal::stdout();
-            writeln!(stdout, "{}", line(frame))?;
+            writeln!(stdout, "{}", line(frame, viewpoint))?;
             stdout.flush()?;
             let (Some(dense), Some(index)) = (&frame.motion.dense, frame.reference_index) else {
                 return Ok(());
@@ -73,8 +76,9 @@ fn write_results(
     outcome: &Outcome,
 ) -> Result<()> {
     let (config, rig) = (&plan.config, &session.rig);
-    write_motion(folder, config, outcome, plan.parquet)?;
-    let summary = Summary::new(NAME.into(), *rig, config, outcome);
+    let viewpoint = Viewpoint { rig, camera: plan.camera };
+    write_motion(folder, config, outcome, viewpoint, plan.parquet)?;
+    let summary = Summary::new(NAME.into(), viewpoint, config, outcome);
     folder.write_json("summary.json", &summary)?;
     let description = RunDescription {
         title: "How the camera moved: frames from standard input",
@@ -84,7 +88,7 @@ fn write_results(
         rig,
         input: InputKind::Stereo,
         biased: summary.biased.is_some(),
-        notes: summary.warnings.clone(),
+        notes: summary.camera_note().into_iter().chain(summary.warnings.clone()).collect(),
     };
     write_report(folder, &description, outcome)
 }
@@ -164,8 +168,8 @@ impl<R: Read> ImagePairs<R> {
 }
 
 /// One frame's answer.
-fn line(frame: &FrameResult) -> Value {
-    let row = motion_row(frame);
+fn line(frame: &FrameResult, viewpoint: Viewpoint<'_>) -> Value {
+    let row = motion_row(frame, viewpoint);
     let finite = |v: f64| v.is_finite().then_some(v);
     let motion = row.motion.as_ref();
     let phi = motion.map(|m| (0..6).map(|i| m.observed[i].then(|| m.phi.mean[i])).collect::<Vec<_>>());

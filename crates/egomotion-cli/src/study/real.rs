@@ -1,4 +1,4 @@
-//! `egomotion study real`: section 7.2 on rendered sequences, or on a recording with true poses.
+//! `egomotion study real`: section 7.2 on rendered sequences, or on a recording, with true poses or without.
 
 use std::path::PathBuf;
 
@@ -8,7 +8,9 @@ use egomotion::pipeline::Unanswered;
 use egomotion::sim::StereoImages;
 use egomotion_io::recording::Reader;
 use egomotion_io::source::{FrameFiles, Source};
-use egomotion_study::real::{DrawId, MatchingSettings, RealError, RealRecord, Triple, publish_recording};
+use egomotion_study::real::{
+    DrawId, MatchingSettings, RealError, RealRecord, ShownFrames, Triple, publish_recording,
+};
 use egomotion_study::{LabStudy, Publication, Study};
 use serde::Serialize;
 
@@ -51,7 +53,7 @@ pub struct RecordingStudy {
     /// Numbers of the frames.
     indices: Vec<usize>,
     #[serde(skip)]
-    frames: Vec<(FrameFiles, RigidMotion)>,
+    frames: Vec<FrameFiles>,
     #[serde(skip)]
     reader: Reader,
 }
@@ -61,9 +63,7 @@ impl RecordingStudy {
         let source = Source::open_with(&path, args.calibration.as_deref())?;
         let name = path.display();
         if source.layout.is_scene_set() {
-            bail!(
-                "{name}: has scenes of two frames; give a sequence with true poses, in KITTI odometry layout"
-            );
+            bail!("{name}: has scenes of two frames; give a sequence of stereo pairs");
         }
         let sequence =
             source.sequences.into_iter().next().with_context(|| format!("{name}: has no frames"))?;
@@ -72,11 +72,7 @@ impl RecordingStudy {
             bail!("{name}: has no calibration; give one with --calibration FILE");
         };
         let chosen = sequence.frames.into_iter().skip(args.start).step_by(args.stride).take(args.frames);
-        let posed = |frame: FrameFiles| frame.truth.map(|pose| (frame, pose));
-        let all: Option<Vec<(FrameFiles, RigidMotion)>> = chosen.map(posed).collect();
-        let Some(frames) = all else {
-            bail!("{name}: has no true poses for these frames; put them beside the images as poses.txt");
-        };
+        let frames: Vec<FrameFiles> = chosen.collect();
         if frames.len() < 3 {
             let words = format!("{} frames are selected; a draw needs three", frames.len());
             return Err(UsageError(words).into());
@@ -91,7 +87,7 @@ impl RecordingStudy {
                 seed: args.laboratory.seed,
             },
             stride: args.stride,
-            indices: frames.iter().map(|(frame, _)| frame.index).collect(),
+            indices: frames.iter().map(|frame| frame.index).collect(),
             frames,
             reader,
         })
@@ -105,8 +101,12 @@ impl RecordingStudy {
     }
 
     /// The frames around the `k`-th one that has a neighbour on either side.
-    fn triple(&self, k: usize) -> Option<&[(FrameFiles, RigidMotion); 3]> {
+    fn triple(&self, k: usize) -> Option<&[FrameFiles; 3]> {
         self.frames.get(k..k + 3)?.try_into().ok()
+    }
+
+    fn images(&self, [a, b, c]: &[FrameFiles; 3]) -> Result<[StereoImages; 3], RecordingError> {
+        Ok([self.read(a)?, self.read(b)?, self.read(c)?])
     }
 }
 
@@ -130,22 +130,27 @@ impl Study for RecordingStudy {
     }
 
     fn parts(&self) -> Vec<String> {
-        let middle = self.frames.windows(3).map(|triple| format!("frame {}", triple[1].0.index));
+        let middle = self.frames.windows(3).map(|triple| format!("frame {}", triple[1].index));
         middle.collect()
     }
 
     fn run(&self, part: usize) -> Result<Vec<RealRecord>, RecordingError> {
-        let Some([a, b, c]) = self.triple(part) else { return Ok(Vec::new()) };
+        let Some(files) = self.triple(part) else { return Ok(Vec::new()) };
+        let [before, now, after] = files;
+        let motion =
+            |from: &FrameFiles, to: &FrameFiles| Some(scene_motion(from.truth.as_ref()?, to.truth.as_ref()?));
         let triple = Triple {
-            frames: [self.read(&a.0)?, self.read(&b.0)?, self.read(&c.0)?],
-            motion: [scene_motion(&a.1, &b.1), scene_motion(&b.1, &c.1)],
-            draw: DrawId { sequence: self.name.clone(), pose: b.0.index as i64, seed: self.how.seed },
+            frames: self.images(files)?,
+            motion: motion(before, now).zip(motion(now, after)).map(Into::into),
+            draw: DrawId { sequence: self.name.clone(), pose: now.index as i64, seed: self.how.seed },
         };
         Ok(triple.records(&self.rig, &self.how)?)
     }
 
     fn publish(&self, records: &[RealRecord]) -> Publication {
-        publish_recording(&self.name, records)
+        let shown = self.triple(self.frames.len() / 2 - 1).and_then(|files| self.images(files).ok());
+        let shown = shown.as_ref().map(|frames| ShownFrames { frames, rig: &self.rig, settings: &self.how });
+        publish_recording(&self.name, records, shown)
     }
 }
 

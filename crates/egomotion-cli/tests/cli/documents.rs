@@ -49,6 +49,17 @@ fn every_source_of_an_equation_is_there() {
     assert!(missing.is_empty(), "equations.md names what is not there: {missing:?}");
 }
 
+#[test]
+fn every_equation_of_the_paper_has_a_row() {
+    let text = fs::read_to_string(root().join("docs/equations.md")).unwrap();
+    let names: Vec<&str> =
+        text.lines().filter_map(|line| line.strip_prefix("| ")?.split(" |").next()).collect();
+    let named =
+        |number: u32| names.iter().any(|name| name.split(", ").any(|one| one == format!("({number})")));
+    let missing: Vec<u32> = (1..=59).filter(|&number| !named(number)).collect();
+    assert!(missing.is_empty(), "no row of equations.md has these: {missing:?}");
+}
+
 /// The anchors of a document's headings, as GitHub makes them.
 fn anchors(text: &str) -> Vec<String> {
     let headings =

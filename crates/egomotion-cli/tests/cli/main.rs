@@ -30,3 +30,4 @@ mod simulate;
 mod sources;
 mod study;
 mod table;
+mod viewpoint;

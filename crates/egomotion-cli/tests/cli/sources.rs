@@ -164,6 +164,8 @@ fn images_beside_depth() {
     let out = TempDir::new().unwrap();
     let ended = run(folder.path(), out.path(), "");
     assert!(ended.stdout.contains("4 of 4 motions answered"), "{}", ended.stdout);
+    let refused = try_run(folder.path(), out.path(), "--frame right");
+    assert_refused(&refused, 2, &["a depth camera has no other beside it", "--frame"]);
     // Exact depth beside noisy images: as good as stereo, whose motion is within .03 mm.
     for (found, stereo) in rows(out.path()).iter().zip(usual("")) {
         let (found, stereo) = (found.motion.as_ref().unwrap().phi.mean, stereo.motion.unwrap().phi.mean);
@@ -229,6 +231,16 @@ fn a_stream_answers_frame_by_frame() {
             assert!((line["phi"][2].as_f64().unwrap() - phi.mean[2]).abs() < 1e-9);
             assert!((line["cov"][2][2].as_f64().unwrap() - phi.cov[(2, 2)]).abs() < 1e-12);
         }
+    }
+    // Lines hold what motion.csv holds, of the camera that was asked for.
+    let out = TempDir::new().unwrap();
+    let ended = piped(&png, out.path(), &["--observe", "sparse", "--rate", &rate, "--frame", "right"]);
+    let lines = ended.stdout.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    for ((line, row), left) in lines.skip(1).zip(rows(out.path())).zip(&expected) {
+        let [phi, left] = [row.motion.as_ref(), left.motion.as_ref()].map(|motion| motion.unwrap().phi);
+        assert!((line["phi"][2].as_f64().unwrap() - phi.mean[2]).abs() < 1e-12);
+        assert!((line["cov"][0][0].as_f64().unwrap() - phi.cov[(0, 0)]).abs() < 1e-15);
+        assert!((phi.mean[2] - left.mean[2]).abs() > 1e-5, "{} {}", phi.mean[2], left.mean[2]);
     }
     // Cut in the last image: what was whole is answered, and the cut frame is named.
     let out = TempDir::new().unwrap();

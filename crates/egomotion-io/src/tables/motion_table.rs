@@ -27,7 +27,7 @@ pub struct MotionRow {
 /// φ of one row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EstimatedMotion {
-    /// φ = (tX, tY, tZ, ΩX, ΩY, ΩZ), scene motion of the left camera, in metres and radians; a component that is not
+    /// φ = (tX, tY, tZ, ΩX, ΩY, ΩZ), scene motion of the left camera or of that which the run's summary names, in metres and radians; a component that is not
     /// observed is 0 with an infinite variance.
     pub phi: Gaussian<6>,
     /// Which components are determined.

@@ -16,7 +16,7 @@ const CONTENDERS: [(&str, Method, EstimatorKind); 9] = [
     ("joint, LS", Method::Joint, EstimatorKind::Ls),
     ("joint, IRLS", Method::Joint, EstimatorKind::Irls),
     ("(22), LS", Method::Linear22, EstimatorKind::Ls),
-    ("rigid, IRLS", Method::Rigid, EstimatorKind::Irls),
+    ("(22) rigid, IRLS", Method::Rigid, EstimatorKind::Irls),
     ("ML", Method::Ml, EstimatorKind::Irls),
 ];
 
@@ -112,7 +112,8 @@ impl EfficiencyPlots<'_> {
                 content: Content::Plot { x, y: Axis::log("variance/bound"), series },
             }
         });
-        let caption = "1/8 px of noise at both ends, 2048 points, no outliers. 1 is the Cramér–Rao bound.";
+        let caption = "1/8 px of noise at both ends, 2048 points, no outliers. 1 is the Cramér–Rao bound. After the comma stands how \
+                       the equations are solved.";
         self.figure("efficiency-method", "variance over the bound, by method", caption, panels.into())
     }
 
@@ -127,8 +128,8 @@ impl EfficiencyPlots<'_> {
                 self.panel(format!("{name}, points"), Axis::places("points", POINTS), approach, &points),
             ]
         });
-        let caption =
-            "The worst component of each contender. What is not swept is held at 1/8 px and 2048 points.";
+        let caption = "The worst component of each contender. What is not swept is held at 1/8 px of noise at both ends, 2048 points and no \
+             outliers. After the comma stands how the equations are solved.";
         self.figure(
             "efficiency-noise",
             "variance over the bound, by noise and points",
@@ -152,7 +153,8 @@ impl EfficiencyPlots<'_> {
                 &settings,
             )
         });
-        let caption = "The worst component of each contender, in units of the bound of the inliers alone.";
+        let caption = "The worst component of each contender, in units of the bound of the inliers alone; 1/8 px of noise at both \
+                       ends, 2048 points. After the comma stands how the equations are solved.";
         self.figure(stem, &format!("variance over the bound, {what}"), caption, panels.into())
     }
 }

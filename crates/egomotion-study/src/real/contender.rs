@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::synthetic::{approach_name, method_name};
+use crate::synthetic::{approach_label, approach_name, method_label, method_name};
 use egomotion::pipeline::{Approach, Method};
 
 /// How equations are solved; the method's own answer at each pixel needs no estimator.
@@ -50,19 +50,22 @@ impl ImageContender {
         [approach_name(self.approach), method_name(self.method), estimator]
     }
 
-    /// Name on a page: `DCCE, LS`.
-    pub(super) fn label(&self) -> &'static str {
-        match (self.method, self.estimator) {
-            (Method::Dcce, ImageEstimator::Lmeds) => "DCCE, LMedS",
-            (Method::Dcce, _) => "DCCE, LS",
-            (Method::Dv, ImageEstimator::Lmeds) => "DV, LMedS",
-            (Method::Dv, _) => "DV, LS",
-            (Method::Linear22, ImageEstimator::Lmeds) => "(22), LMedS",
-            (Method::Linear22, _) => "(22), LS",
-            (Method::Rigid, ImageEstimator::Lmeds) => "(22) with a rotation, LMedS",
-            (Method::Rigid, _) => "(22) with a rotation, LS",
-            (Method::Joint, _) => "DV and flow jointly",
-            (Method::Ml, _) => "maximum likelihood",
+    /// Name in a table, `DCCE, LS`; maximum likelihood has no other estimator.
+    pub(super) fn label(&self) -> String {
+        let method = method_label(self.method);
+        match self.estimator {
+            ImageEstimator::Ml => method.to_owned(),
+            ImageEstimator::Lmeds => format!("{method}, LMedS"),
+            ImageEstimator::Pixel | ImageEstimator::Ls => format!("{method}, LS"),
+        }
+    }
+
+    /// Name in the legend of a figure that shows both approaches, `DCCE DIFF`; maximum likelihood is discrete alone.
+    pub(super) fn legend(&self) -> String {
+        let method = method_label(self.method);
+        match self.method {
+            Method::Ml => method.to_owned(),
+            _ => format!("{method} {}", approach_label(self.approach)),
         }
     }
 }

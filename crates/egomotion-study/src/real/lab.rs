@@ -100,7 +100,7 @@ impl LabStudy {
 
         let to_cyclopean = -rig.left_from_cyclopean();
         let phi = found.motions.iter().flat_map(|(contender, estimate)| {
-            draw.phi(*contender, &estimate.seen_from(&to_cyclopean), &rendered.motion())
+            draw.phi(*contender, &estimate.seen_from(&to_cyclopean), Some(&rendered.motion()))
         });
         let mut records: Vec<RealRecord> = phi.collect();
         records.extend(truth.matching(&draw, &found.matched));
@@ -147,6 +147,7 @@ impl Study for LabStudy {
     }
 
     fn publish(&self, records: &[RealRecord]) -> Publication {
-        publish::lab(self.example().as_ref(), records)
+        let example = self.example();
+        publish::lab(example.as_ref().map(|(frames, matched)| (frames, matched)), records)
     }
 }

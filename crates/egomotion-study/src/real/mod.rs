@@ -1,7 +1,8 @@
 //! Section 7.2: the manipulator's sequences, or a recording, through the whole image pipeline.
 //!
 //! [`LabStudy`] repeats Tables 3 to 7 and Figures 11 to 14 on rendered sequences, with the paper's values beside ours
-//! and maximum likelihood beside both. A [`Triple`] of frames gives the same records for a recording with true poses.
+//! and maximum likelihood beside both. A [`Triple`] of frames gives the same records for a recording, and
+//! [`publish_recording`] the same tables and figures; errors need its true poses.
 //!
 //! Choices. The differential approach is the paper's own: derivatives at t, d_t = ½ (d(t+1) − d(t−1)), and the image
 //! velocity at t as half the displacement from t−1 to t+1 in the left and in the right image, so that both are of
@@ -31,7 +32,7 @@ pub use lab::LabStudy;
 pub use matching::MatchingError;
 pub use quantity::Quantity;
 pub use record::{DrawId, RealRecord};
-pub use recording::{Triple, publish_recording};
+pub use recording::{ShownFrames, Triple, publish_recording};
 
 use crate::sequences::NoSequence;
 use egomotion::pipeline::PipelineError;

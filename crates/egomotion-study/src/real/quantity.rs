@@ -28,6 +28,9 @@ pub enum Quantity {
     Disparity,
     /// Median error of flow, in pixels.
     Flow,
+    /// Share of the true image motion that the turn makes, from 0 (all is translation) to 1; without a truth, of the
+    /// motion that maximum likelihood finds.
+    TurnShare,
 }
 
 impl Quantity {
@@ -48,6 +51,7 @@ impl Quantity {
             Self::Wz => "wz",
             Self::Disparity => "disparity",
             Self::Flow => "flow",
+            Self::TurnShare => "turn_share",
         }
     }
 
@@ -63,6 +67,7 @@ impl Quantity {
             Self::Wz => "ΩZ (°)",
             Self::Disparity => "disparity (px)",
             Self::Flow => "flow (px)",
+            Self::TurnShare => "share of the turn",
         }
     }
 

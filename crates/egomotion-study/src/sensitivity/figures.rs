@@ -9,6 +9,11 @@ use crate::{Axis, Content, Figure, Line, Panel, Point, Series};
 ///
 /// Exact answers leave rounding errors alone, which a logarithmic axis would stretch over many decades.
 const LEAST_DRAWN: f64 = 1e-4;
+/// What the baseline real holds, no unit: said under every figure of it.
+const REAL_HELD: &str = "What is not swept is held at STEP 1, disparity rounded to 1/16 px, noise of 1/8 px in disparity, velocity \
+     and tracks, 2048 features (discrete).";
+/// How the equations of the lines of φ are solved, no unit.
+const PHI_SOLVED: &str = "DCCE, DV and (22) by least squares with all rows alike, ML by maximum likelihood.";
 
 /// Names of the contender that a line shows: approach, method, estimator.
 type ContenderNames = [&'static str; 3];
@@ -74,18 +79,26 @@ impl SweepPlots<'_> {
             self.panel(&format!("({letter}) {name}"), "VZ", *sweeps, &lines)
         });
         let about = "error of VZ of each pixel";
-        self.figure("07", about, 2, panels.collect())
+        let solved = "DCCE and DV: each pixel's own value, which needs no estimator; ML: the rigid scene under maximum likelihood.";
+        self.figure("07", (about, solved), 2, panels.collect())
     }
 
     fn figure_8(&self) -> Figure {
-        self.figure("08", "error of tZ, ΩX and ΩY: velocity and resolution", 3, self.phi_panels(0))
+        let about = "error of tZ, ΩX and ΩY: velocity and resolution";
+        self.figure("08", (about, PHI_SOLVED), 3, self.phi_panels(0))
     }
 
     fn figure_9(&self) -> Figure {
-        self.figure("09", "error of tZ, ΩX and ΩY: noise", 3, self.phi_panels(2))
+        self.figure("09", ("error of tZ, ΩX and ΩY: noise", PHI_SOLVED), 3, self.phi_panels(2))
     }
 
-    fn figure(&self, number: &str, about: &str, columns: usize, panels: Vec<Panel>) -> Figure {
+    fn figure(
+        &self,
+        number: &str,
+        (about, solved): (&str, &str),
+        columns: usize,
+        panels: Vec<Panel>,
+    ) -> Figure {
         let (sequence, baseline) = (self.sequence, self.baseline.name());
         let paper = if sequence == "C" {
             format!("Figure {}", number.trim_start_matches('0'))
@@ -93,14 +106,16 @@ impl SweepPlots<'_> {
             format!("As Figure {}", number.trim_start_matches('0'))
         };
         let held = match self.baseline {
-            Baseline::Clean => "What is not swept is held at STEP 1, no rounding, no noise.",
-            Baseline::Real => "What is not swept is held at STEP 1, 1/16 px of disparity, 1/8 px of noise.",
+            Baseline::Clean => {
+                "What is not swept is held at STEP 1, no rounding, no noise, 2048 features (discrete)."
+            }
+            Baseline::Real => REAL_HELD,
         };
         Figure {
             id: format!("figure-{number}-{sequence}-{baseline}"),
             title: format!("{paper}. Sequence {sequence}, baseline {baseline}: {about}"),
             caption: format!(
-                "{held} Least squares; bars are ± 2 standard errors over the draws. Errors below {LEAST_DRAWN} are drawn there."
+                "{held} {solved} Bars are ± 2 standard errors over the draws. Errors below {LEAST_DRAWN} are drawn there."
             ),
             columns,
             panels,
@@ -136,7 +151,7 @@ impl SweepPlots<'_> {
             ("DV DISC", "discrete", "dv"),
             ("joint DISC", "discrete", "joint"),
             ("(22) DISC", "discrete", "linear22"),
-            ("rigid DISC", "discrete", "rigid"),
+            ("(22) rigid DISC", "discrete", "rigid"),
         ];
         let panels = methods.iter().zip('a'..).map(|((heading, approach, method), letter)| {
             let lines: Vec<LineOf<'_>> = vec![
@@ -152,10 +167,10 @@ impl SweepPlots<'_> {
         Figure {
             id: format!("estimators-{}", self.sequence),
             title: format!("Sequence {}: error of tZ by method and estimator", self.sequence),
-            caption: "Against the resolution of disparity, baseline real: least squares, least median of \
-                      squares, Student's t with rows weighted by their variance, maximum likelihood, and the \
-                      Cramér–Rao bound."
-                .to_owned(),
+            caption: format!(
+                "{REAL_HELD} LS: least squares, LMedS: least median of squares, IRLS: Student's t with rows weighted by \
+                 their variance, ML: maximum likelihood, bound: the Cramér–Rao bound."
+            ),
             columns: 3,
             panels,
         }
@@ -172,10 +187,9 @@ impl SweepPlots<'_> {
         Figure {
             id: format!("features-{}", self.sequence),
             title: format!("Sequence {}: error against the number of features", self.sequence),
-            caption:
-                "Baseline real, discrete approach, least squares. An error that does not fall with more \
-                      features is bias."
-                    .to_owned(),
+            caption: format!(
+                "Discrete approach. {REAL_HELD} {PHI_SOLVED} An error that does not fall with more features is bias."
+            ),
             columns: 2,
             panels,
         }

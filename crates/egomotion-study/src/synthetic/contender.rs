@@ -49,6 +49,26 @@ pub(crate) fn method_name(method: Method) -> &'static str {
     }
 }
 
+/// Name of a method in tables and legends, the same in all of them.
+pub(crate) fn method_label(method: Method) -> &'static str {
+    match method {
+        Method::Ml => "ML",
+        Method::Dcce => "DCCE",
+        Method::Dv => "DV",
+        Method::Joint => "joint",
+        Method::Rigid => "(22) rigid",
+        Method::Linear22 => "(22)",
+    }
+}
+
+/// The paper's short name of an approach, in legends.
+pub(crate) fn approach_label(approach: Approach) -> &'static str {
+    match approach {
+        Approach::Discrete => "DISC",
+        Approach::Differential => "DIFF",
+    }
+}
+
 impl Contender {
     /// All contenders of an approach: each method with each estimator that has a meaning for it.
     pub fn all(approach: Approach) -> Vec<Self> {

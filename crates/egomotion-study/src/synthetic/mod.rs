@@ -9,7 +9,7 @@ mod measurement;
 mod world;
 
 pub use contender::Contender;
-pub(crate) use contender::{APPROACHES, approach_name, method_name};
+pub(crate) use contender::{APPROACHES, approach_label, approach_name, method_label, method_name};
 pub use draw::{DifferentialDraw, DiscreteDraw, Draw};
 pub use measurement::{LEAST_FEATURES, MeasurementModel};
 pub(crate) use world::FrameTime;

@@ -176,8 +176,8 @@ pub(super) fn figure(found: &[&Coefficients]) -> Figure {
         title: "Figure 6. Uncertainty coefficients of (53): effect of depth".to_owned(),
         caption:
             "Variance of VZ = Coef_disp σ²_d + Coef_vel σ²_v, mean over the sphere's usable pixels while \
-                  its centre moves from 2.5 to 5 m under the motion of sequence C. 1 DCCE differential, 2 DV \
-                  differential, 3 DCCE discrete, 4 DV discrete. For the discrete DCCE, Coef_vel weighs the \
+                  its centre moves from 2.5 to 5 m under the motion of sequence C. 1 DCCE DIFF, 2 DV DIFF, \
+                  3 DCCE DISC, 4 DV DISC; the formulas on exact measurements. For the discrete DCCE, Coef_vel weighs the \
                   variance of one component of the displacement, σ²_x + σ²_x′; for the discrete DV it is \
                   zero. The printed coefficients take σ²_di = ½ σ²_d for d_t of the discrete form too; the \
                   corrected ones, of (39c) and (47c), have its 2 σ²_d and the shared disparity."

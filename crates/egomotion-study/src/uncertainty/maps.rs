@@ -58,11 +58,11 @@ pub(super) fn figure_5(sequence: &Sequence) -> Figure {
         }
     }
     let titles = [
-        "(39), DCCE differential, as printed",
-        "(39c), DCCE differential",
-        "(44), DV differential",
-        "(47c), DCCE discrete",
-        "(50), DV discrete",
+        "(39), DCCE DIFF, as printed",
+        "(39c), DCCE DIFF",
+        "(44), DV DIFF",
+        "(47c), DCCE DISC",
+        "(50), DV DISC",
         "(39c)/(44): DCCE against DV",
     ];
     let panel = |(title, field): (&str, Grid<f32>)| {

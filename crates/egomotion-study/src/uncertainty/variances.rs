@@ -253,7 +253,7 @@ pub(super) fn product_figure(cases: &[&VarianceCase]) -> Figure {
             found[usize::from(first.family == Family::DcceDiscrete)].push((first, product));
         }
     }
-    let drawn = ["(39c), differential", "(47c), discrete"].into_iter().zip(&found).map(|(name, found)| {
+    let drawn = ["(39c), DCCE DIFF", "(47c), DCCE DISC"].into_iter().zip(&found).map(|(name, found)| {
         let points = found.iter().map(|&(case, x)| Point {
             x,
             y: case.ratio() - 1.0,

@@ -25,5 +25,5 @@ pub use perspective::{image_flow, image_velocity};
 pub use rectification::{RectificationError, StereoRectification};
 pub(crate) use regions::Cells;
 pub use regions::PixelBounds;
-pub use rig::{RigError, StereoRig};
+pub use rig::{RigCamera, RigError, StereoRig};
 pub use twist::{RigidMotion, Twist};

@@ -50,6 +50,19 @@ pub struct StereoRig {
     pub height_px: usize,
 }
 
+/// A camera of a rig in whose frame φ can be given; all three are parallel.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RigCamera {
+    /// The left camera, in whose frame φ is estimated.
+    #[default]
+    Left,
+    /// The right camera.
+    Right,
+    /// The cyclopean camera, in the middle between the two.
+    Cyclopean,
+}
+
 /// Why a rig cannot measure anything.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum RigError {
@@ -214,6 +227,16 @@ impl StereoRig {
         ]))
     }
 
+    /// Centre of a camera in the frame of the left one, in metres: what [`crate::geometry::Twist::seen_from`] takes, (4).
+    pub fn centre_from_left(&self, camera: RigCamera) -> Vector3<f64> {
+        let share = match camera {
+            RigCamera::Left => 0.0,
+            RigCamera::Right => 1.0,
+            RigCamera::Cyclopean => 0.5,
+        };
+        Vector3::new(share * self.baseline_m, 0.0, 0.0)
+    }
+
     /// Centre of the left camera in the cyclopean frame, (−b/2, 0, 0), in metres; the right one is its negative.
     pub fn left_from_cyclopean(&self) -> Vector3<f64> {
         Vector3::new(-0.5 * self.baseline_m, 0.0, 0.0)
@@ -245,6 +268,15 @@ mod tests {
         let phi = nalgebra::Vector6::new(t.x, t.y, t.z, w.x, w.y, w.z);
         let rates = rig().velocity_jacobian(&rig().project(&p).unwrap()) * phi;
         assert!((rates - moved).norm() < 1e-12);
+    }
+
+    #[test]
+    fn cameras_stand_in_a_row() {
+        let [left, middle, right] =
+            [RigCamera::Left, RigCamera::Cyclopean, RigCamera::Right].map(|c| rig().centre_from_left(c));
+        assert_eq!((left, middle), (Vector3::zeros(), -rig().left_from_cyclopean()));
+        // A point straight ahead of the right camera is one disparity to the right of the left one's centre.
+        assert_eq!(rig().project(&(right + Vector3::z())).unwrap().x, rig().disparity(1.0).unwrap());
     }
 
     #[test]

@@ -9,10 +9,14 @@ pub struct SectionSeven {
     pub erm_signed_percent: Option<f64>,
     /// ERM, absolute: mean of |(estimate − truth)/truth|, in percent; `None` where the truth is zero.
     pub erm_abs_percent: Option<f64>,
+    /// Median of |(estimate − truth)/truth|, in percent, which single wild points cannot ruin; `None` where the truth is zero.
+    pub erm_median_percent: Option<f64>,
     /// STD: standard deviation of estimate/truth (n − 1), in percent; `None` with fewer than two points.
     pub std_percent: Option<f64>,
     /// EAM: mean of |estimate − truth|, in the unit of the values, over all points.
     pub eam: f64,
+    /// Median of |estimate − truth|, in the unit of the values, over all points.
+    pub eam_median: f64,
     /// Standard deviation of estimate − truth (n − 1), in the unit of the values; 0 for one point.
     pub std: f64,
     /// Number of points with an estimate and a truth.
@@ -41,11 +45,18 @@ impl SectionSeven {
         Some(Self {
             erm_signed_percent: mean(&relative),
             erm_abs_percent: mean_abs(&relative),
+            erm_median_percent: median_abs(&relative),
             std_percent: standard_deviation(&relative),
             eam: mean_abs(&errors)?,
+            eam_median: median_abs(&errors)?,
             std: standard_deviation(&errors).unwrap_or(0.0),
             count: errors.len(),
             relative_count: relative.len(),
         })
     }
+}
+
+/// Median of absolute values; `None` of no values.
+fn median_abs(values: &[f64]) -> Option<f64> {
+    quantile(&values.iter().map(|value| value.abs()).collect::<Vec<_>>(), 0.5)
 }

@@ -1,6 +1,6 @@
 //! VZ of one pixel by the paper's four methods, by the un-linearised (6), and as part of a rigid scene.
 
-use nalgebra::{Matrix2, SMatrix, Vector2, Vector4};
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector2, Vector3, Vector4};
 
 use crate::geometry::distribution::CHI2_1_P9973;
 use crate::geometry::{Field, Gaussian, StereoRig};
@@ -111,6 +111,21 @@ pub fn dcce_coefficients(flow: &DepthFlow, bf: f64) -> (f64, f64) {
     (part([1.0, 0.5, 0.5, 0.5], [0.0; 2]), part([0.0; 4], [1.0; 2]))
 }
 
+/// Coefficients (of σ²_d, of σ²_v) in the variance of (17) as printed in (47), equation (53); `bf` is b f.
+///
+/// Gradients have σ²_di = ½ σ²_d and d_t = d′ − d has 2 σ²_d; σ²_v is the variance of one component of the displacement.
+pub fn dcce_discrete_coefficients(track: &DepthTrack, bf: f64) -> (f64, f64) {
+    let part = |disparity: [f64; 4], displacement: [f64; 2]| {
+        let with = DepthTrack {
+            disparity: Gaussian::independent(track.disparity.mean.into(), disparity),
+            displacement: Gaussian::independent(track.displacement.mean.into(), displacement),
+            ..*track
+        };
+        dcce_discrete_variance_as_printed(&with, bf)
+    };
+    (part([1.0, 1.0, 0.5, 0.5], [0.0; 2]), part([0.0; 4], [1.0; 2]))
+}
+
 /// VZ = −(Z²/(b f)) Δv, (9), with variance (44); `bf` is b f.
 pub fn dv(flow: &StereoFlow, bf: f64) -> DepthVelocity {
     let d = flow.measured.mean[0];
@@ -145,6 +160,15 @@ pub fn dv_discrete(track: &StereoTrack, bf: f64) -> DepthVelocity {
         [track.before.cov[(2, 2)], track.after.cov[(2, 2)]],
     );
     DepthVelocity::from_disparities(&disparities, bf)
+}
+
+/// Coefficients (of σ²_d, of σ²_v) in the variance of (21), equation (53), with σ_d alike before and after; `bf` is b f.
+///
+/// The second is 0: (21) takes no displacement.
+pub fn dv_discrete_coefficients(track: &StereoTrack, bf: f64) -> (f64, f64) {
+    let unit = |end: &Gaussian<3>| Gaussian { cov: Matrix3::from_diagonal(&Vector3::z()), ..*end };
+    let with = StereoTrack { before: unit(&track.before), after: unit(&track.after) };
+    (dv_discrete(&with, bf).vz().variance(), 0.0)
 }
 
 /// Variance of (21) as printed in (49), which takes Z, Z′, d and d′ as independent; `bf` is b f.

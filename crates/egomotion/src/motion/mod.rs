@@ -4,6 +4,7 @@ pub mod depth_velocity;
 mod impact;
 mod obstacle;
 mod rigid_prediction;
+mod scaled_depth;
 mod vehicle;
 
 pub use depth_velocity::DepthVelocity;
@@ -11,4 +12,5 @@ pub use impact::TimeToImpact;
 pub(crate) use obstacle::nearest_obstacle;
 pub use obstacle::{NoObstacle, Obstacle, ObstacleCriteria, Sightings};
 pub use rigid_prediction::{DisparityOffset, RigidPrediction};
+pub use scaled_depth::{rotation_left_out, scaled_depth};
 pub use vehicle::Vehicle;

@@ -31,7 +31,8 @@ pub enum StudyCommand {
     /// Section 7.2: Tables 3 to 7 and Figures 11 to 14, on the manipulator's sequences or on a recording.
     ///
     /// Without SOURCE the sequences lab-A … lab-M are rendered and go through the whole image pipeline. SOURCE is a
-    /// folder in KITTI odometry layout with true poses (poses.txt, or ../../poses/NAME.txt).
+    /// stereo recording that `run` takes. Errors, and with them Figures 12 to 14, need its true poses; without them the
+    /// tables hold estimates alone.
     Real(RealArgs),
     /// Sections 1, 3.1 and 4.3: depth against brightness, and instantaneous formulas on finite motions.
     Assumptions(LaboratoryArgs),

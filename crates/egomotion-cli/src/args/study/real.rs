@@ -10,7 +10,7 @@ use crate::args::values::{lab_sequence, positive, size};
 /// Section 7.2 on images.
 #[derive(Debug, Clone, Args)]
 pub struct RealArgs {
-    /// Folder of a recording with true poses [default: the rendered sequences].
+    /// Folder of a stereo recording [default: the rendered sequences].
     pub source: Option<PathBuf>,
     /// The rendered sequences to use, such as lab-A,lab-E [default: all twelve].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', conflicts_with = "source", value_parser = lab_sequence)]

@@ -20,6 +20,12 @@ use style::{Style, styles};
 const PLOT_HEIGHT: f64 = 272.0;
 /// Space between panels, in SVG units.
 const PANEL_GAP: f64 = 18.0;
+/// Size of a caption's letters, in SVG units.
+const CAPTION_PX: f64 = 11.5;
+/// Share of the room of a text that its letters are meant to fill, no unit: fonts that are wider than expected fill the rest.
+const FONT_SHARE: f64 = 0.87;
+/// From one line of a caption to the next, in SVG units.
+const CAPTION_LINE: f64 = 16.0;
 /// Fonts that look alike, of which every system has one; the last is any without serifs.
 const FONTS: &str = "Helvetica, Arial, Liberation Sans, DejaVu Sans, sans-serif";
 
@@ -135,7 +141,7 @@ fn legend(styles: &[Style], drawables: &[Drawable<'_>]) -> Vec<(Markup, String)>
     entries
 }
 
-/// The figure as a file of its own.
+/// The figure as a file of its own: title, legend, panels, and its caption below them.
 pub fn svg(figure: &Figure) -> String {
     let drawing = Drawing::new(figure, "panel");
     let wide = PANEL_GAP + drawing.columns as f64 * (PANEL_WIDTH + PANEL_GAP);
@@ -144,12 +150,13 @@ pub fn svg(figure: &Figure) -> String {
     let (legend, legend_rows) = legend_at(&drawing.legend, wide - 2.0 * PANEL_GAP);
     let panels_top = legend_top + 19.0 * legend_rows as f64 + 8.0;
     let (panels, panels_height) = drawing.together();
-    let tall = panels_top + panels_height;
+    let caption = lines(&figure.caption, FONT_SHARE * (wide - 2.0 * PANEL_GAP), CAPTION_PX);
+    let caption_top = panels_top + panels_height;
+    let tall = caption_top + CAPTION_LINE * caption.len() as f64 + 0.5 * PANEL_GAP;
     let picture = html! {
         svg xmlns="http://www.w3.org/2000/svg" width=(format!("{wide:.0}")) height=(format!("{tall:.0}"))
             viewBox=(format!("0 0 {wide:.0} {tall:.0}")) font-family=(FONTS) {
             title { (figure.title) }
-            desc { (figure.caption) }
             rect width="100%" height="100%" fill="#fff" {}
             g font-size="15" font-weight="bold" fill="#111" {
                 @for (k, line) in title.iter().enumerate() {
@@ -158,6 +165,11 @@ pub fn svg(figure: &Figure) -> String {
             }
             g transform=(format!("translate({PANEL_GAP} {legend_top:.1})")) font-size=(TITLE_PX) fill="#111" { (legend) }
             g transform=(format!("translate(0 {panels_top:.1})")) { (panels) }
+            g font-size=(CAPTION_PX) fill="#33383d" {
+                @for (k, line) in caption.iter().enumerate() {
+                    text x=(PANEL_GAP) y=(format!("{:.1}", caption_top + CAPTION_LINE * k as f64 + 8.0)) { (line) }
+                }
+            }
         }
     };
     // XML takes no control characters, escaped or not.
@@ -172,7 +184,7 @@ fn legend_at(entries: &[(Markup, String)], most: f64) -> (Markup, usize) {
     let places: Vec<(f64, f64)> = entries
         .iter()
         .map(|(_, name)| {
-            let wide = 36.0 + text_width(name, TITLE_PX) + 14.0;
+            let wide = 36.0 + text_width(name, TITLE_PX) / FONT_SHARE + 14.0;
             if x > 0.0 && x + wide > most {
                 (x, row) = (0.0, row + 1);
             }

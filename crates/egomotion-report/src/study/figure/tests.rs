@@ -123,6 +123,22 @@ fn strokes<'a>(document: &'a Document<'_>, colour: &str) -> Vec<Node<'a, 'a>> {
 }
 
 #[test]
+fn a_file_says_how_it_is_read() {
+    let caption = "Noise of 1/8 px, least squares. ".repeat(20);
+    let panels = vec![plot(Axis::linear("x"), Axis::linear("y"), vec![])];
+    let text = svg(&Figure { caption: caption.clone(), ..figure(1, panels) });
+    let document = check(&text);
+    let said: Vec<&str> = texts(&document).into_iter().filter(|line| line.contains("squares")).collect();
+    assert!(said.len() > 3 && said.iter().all(|line| line.len() < 90), "{said:?}");
+    assert_eq!(said.join(" "), caption.trim());
+    // Inside the picture.
+    let tall: f64 = document.root_element().attribute("height").unwrap().parse().unwrap();
+    let lines = document.descendants().filter(|n| n.text().is_some_and(|t| t.contains("squares")));
+    let lowest = lines.filter_map(|n| n.attribute("y")?.parse::<f64>().ok()).fold(0.0, f64::max);
+    assert!(lowest > 300.0 && lowest < tall, "{lowest} of {tall}");
+}
+
+#[test]
 fn one_name_has_one_colour_in_every_panel() {
     let line = |name: &str| series(name, Line::Solid, vec![point(0.0, 1.0), point(1.0, 2.0)]);
     let panels = vec![

@@ -16,8 +16,9 @@ pub(super) fn estimators(results: &RealResults<'_>) -> Table {
          better one. Last row: maximum likelihood over the best of all the others in each sequence.",
         &columns(&[("approach", "approach"), ("method", "method")]),
     );
-    let eam =
-        |name: &str, contender, quantity| results.get(name, Some(contender), quantity).map(|found| found.eam);
+    let eam = |name: &str, contender, quantity| {
+        results.get(name, Some(contender), quantity)?.eam.map(|eam| eam.mean)
+    };
     let all: Vec<ImageContender> =
         APPROACHES.into_iter().flat_map(contenders).filter(|w| *w != ImageContender::BEST).collect();
     for ls in all.iter().filter(|contender| contender.estimator == ImageEstimator::Ls) {
@@ -61,7 +62,7 @@ pub(super) fn consistency(results: &RealResults<'_>) -> Table {
             let chosen =
                 results.records.iter().filter(|r| r.contender == Some(contender) && r.quantity == quantity);
             let squares: Vec<f64> =
-                chosen.filter_map(|r| Some(((r.estimate - r.truth) / r.sigma?).powi(2))).collect();
+                chosen.filter_map(|r| Some(((r.estimate - r.truth?) / r.sigma?).powi(2))).collect();
             (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
         };
         table.rows.push(row(contender.names(), Quantity::PHI.map(normalised)));

@@ -5,11 +5,10 @@ use crate::real::contender::ImageContender;
 use crate::real::quantity::Quantity;
 use crate::real::record::RealRecord;
 use crate::real::statistics::PooledStatistics;
-use crate::sequences::two_frames;
 use crate::{Cell, Table};
 
-/// One row for each sequence, contender and quantity, in the columns that all studies share.
-pub(super) fn aggregated(results: &RealResults<'_>) -> Table {
+/// One row for each sequence, contender and quantity, in the columns that all studies share, and the medians.
+pub(super) fn aggregated(results: &RealResults<'_>, speed: impl Fn(&str) -> Option<f64>) -> Table {
     let columns = [
         "sequence",
         "baseline",
@@ -28,12 +27,16 @@ pub(super) fn aggregated(results: &RealResults<'_>) -> Table {
         "estimate",
         "truth",
         "scatter",
+        "median",
+        "erm_median",
+        "eam_median",
     ];
     let mut table = Table::new(
         "real",
         "Section 7.2, summed up",
         "ERM in percent, all else in mm, degrees or pixels; std is in percent where there is an ERM; that of VZ is over pixels and draws, all other std and \
-         the scatter of the estimate are over draws; n counts draws; value is the sequence's speed in mm or degrees.",
+         the scatter of the estimate are over draws; n counts draws; value is the sequence's speed in mm or degrees. \
+         Medians are over draws: of the estimate, of the absolute relative error, of EAM; of VZ those of the estimate and the relative error are of medians over pixels.",
         &columns.map(|name| (name, name)),
     );
     let mut seen: Vec<(&str, Option<ImageContender>, Quantity)> = Vec::new();
@@ -51,12 +54,11 @@ pub(super) fn aggregated(results: &RealResults<'_>) -> Table {
             vec![sequence.into(), "images".into(), "speed".into(), speed(sequence).into()];
         row.extend(names(contender).map(Cell::from));
         row.push(quantity.name().into());
-        row.extend(
-            [found.erm_signed, found.erm_abs, Some(found.eam), found.std_percent.or(Some(found.std))]
-                .map(Cell::from),
-        );
-        row.extend([found.standard_error.into(), found.n.into()]);
-        row.extend([found.estimate, found.truth, found.scatter].map(Cell::from));
+        let means = [found.erm_signed, found.erm_abs, found.eam].map(|error| error.map(|error| error.mean));
+        row.extend(means.into_iter().chain([found.std_percent.or(Some(found.std))]).map(Cell::from));
+        row.extend([found.error().and_then(|error| error.standard_error).into(), found.n.into()]);
+        let last = [Some(found.estimate), found.truth, Some(found.scatter), Some(found.median)];
+        row.extend(last.into_iter().chain([found.erm_median, found.eam_median]).map(Cell::from));
         table.rows.push(row);
     }
     table
@@ -81,12 +83,14 @@ pub(super) fn draws(records: &[RealRecord]) -> Table {
         "eam",
         "std",
         "n",
+        "median",
+        "erm_median",
     ];
     let mut table = Table::new(
         "real-draws",
         "Section 7.2, every draw",
         "Estimate, truth and error in mm, degrees or pixels; of VZ their means over n pixels. sigma is what the \
-         estimator itself states.",
+         estimator itself states; median and erm_median are over the pixels.",
         &columns.map(|name| (name, name)),
     );
     for record in records {
@@ -97,9 +101,10 @@ pub(super) fn draws(records: &[RealRecord]) -> Table {
         ];
         row.extend(names(record.contender).map(Cell::from));
         row.push(record.quantity.name().into());
-        row.extend([record.estimate, record.truth, record.estimate - record.truth].map(Cell::from));
-        row.extend([record.sigma, record.erm_signed, record.erm_abs].map(Cell::from));
-        row.extend([record.eam.into(), record.std.into(), record.n.into()]);
+        let error = record.truth.map(|truth| record.estimate - truth);
+        row.extend([Some(record.estimate), record.truth, error, record.sigma].map(Cell::from));
+        row.extend([record.erm_signed, record.erm_abs, record.eam, Some(record.std)].map(Cell::from));
+        row.extend([record.n.into(), record.median.into(), record.erm_median.into()]);
         table.rows.push(row);
     }
     table
@@ -107,11 +112,4 @@ pub(super) fn draws(records: &[RealRecord]) -> Table {
 
 fn names(contender: Option<ImageContender>) -> [&'static str; 3] {
     contender.map_or(["", "matching", ""], |contender| contender.names())
-}
-
-/// How fast a sequence is: |tZ| in mm per frame, or |ΩY| in degrees per frame where it only turns.
-pub(super) fn speed(sequence: &str) -> Option<f64> {
-    let phi = two_frames(sequence)?.phi_cyclopean(0)?;
-    let (forward, turn) = (1e3 * phi.t.z.abs(), phi.omega.y.to_degrees().abs());
-    Some(if forward > 0.0 { forward } else { turn })
 }

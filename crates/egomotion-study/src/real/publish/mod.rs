@@ -3,7 +3,9 @@
 mod comparison;
 mod data;
 mod figures;
+mod lab;
 mod recording;
+mod speed;
 mod tables;
 
 use super::contender::ImageContender;
@@ -11,39 +13,45 @@ use super::matching::MatchedFrames;
 use super::quantity::Quantity;
 use super::record::RealRecord;
 use super::statistics::PooledStatistics;
-use crate::Publication;
-use egomotion::sim::{Sequence, StereoImages};
+use crate::{Publication, Table};
+use egomotion::sim::StereoImages;
 
-/// Tables and figures of the rendered sequences; `example` is what Figure 11 shows.
-pub(super) fn lab(
-    example: Option<&([StereoImages; 3], MatchedFrames)>,
-    records: &[RealRecord],
-) -> Publication {
+/// Three frames and what is matched in them, which Figure 11 shows.
+pub(super) type Example<'a> = (&'a [StereoImages; 3], &'a MatchedFrames);
+
+/// Tables and figures of the rendered sequences.
+pub(super) fn lab(example: Option<Example<'_>>, records: &[RealRecord]) -> Publication {
     let results = RealResults { records };
-    let mut tables = vec![tables::matching(&results)];
-    tables.extend(tables::printed(&results));
-    tables.push(comparison::estimators(&results));
-    tables.push(comparison::consistency(&results));
+    let mut tables = vec![lab::matching(&results)];
+    tables.extend(lab::printed(&results));
     Publication {
         title: "Section 7.2: the manipulator's sequences through the whole image pipeline".to_owned(),
-        data: vec![data::aggregated(&results), data::draws(records)],
-        tables,
-        figures: figures::all(example, &results),
+        data: vec![data::aggregated(&results, lab::speed), data::draws(records)],
+        tables: with_comparisons(tables, &results),
+        figures: lab::figures(example, &results),
     }
 }
 
 /// Tables and figures of a recording; `name` is that of its sequence.
-pub(super) fn recording(name: &str, records: &[RealRecord]) -> Publication {
-    let results = RealResults { records };
-    let mut tables = recording::tables(name, &results);
-    tables.push(comparison::estimators(&results));
-    tables.push(comparison::consistency(&results));
+pub(super) fn recording(name: &str, records: &[RealRecord], example: Option<Example<'_>>) -> Publication {
+    let split = recording::by_path(records);
+    let results = RealResults { records: &split };
+    let speed = |sequence: &str| recording::speed(&results, sequence);
     Publication {
         title: format!("Section 7.2 on a recording: {name}"),
-        data: vec![data::aggregated(&results), data::draws(records)],
-        tables,
-        figures: recording::figures(&results),
+        data: vec![data::aggregated(&results, speed), data::draws(&split)],
+        tables: with_comparisons(recording::tables(name, &results), &results),
+        figures: recording::figures(name, example, &results),
     }
+}
+
+/// These tables, and the two that compare errors, if there are any.
+fn with_comparisons(mut tables: Vec<Table>, results: &RealResults<'_>) -> Vec<Table> {
+    if results.have_truth() {
+        tables.push(comparison::estimators(results));
+        tables.push(comparison::consistency(results));
+    }
+    tables
 }
 
 /// The records, and statistics over them.
@@ -59,19 +67,24 @@ impl RealResults<'_> {
         contender: Option<ImageContender>,
         quantity: Quantity,
     ) -> Option<PooledStatistics> {
-        PooledStatistics::of(self.records, |record| {
-            record.contender == contender && record.quantity == quantity && record.sequence == sequence
-        })
+        self.among(|record| record.sequence == sequence, contender, quantity)
     }
 
-    /// Over the draws of the lab sequence of that letter.
-    fn lab(
+    /// Over the draws of which a record says so.
+    fn among(
         &self,
-        letter: &str,
+        draws: impl Fn(&RealRecord) -> bool,
         contender: Option<ImageContender>,
         quantity: Quantity,
     ) -> Option<PooledStatistics> {
-        self.get(&lab_name(letter), contender, quantity)
+        PooledStatistics::of(self.records, |record| {
+            record.contender == contender && record.quantity == quantity && draws(record)
+        })
+    }
+
+    /// Whether any record knows its truth.
+    fn have_truth(&self) -> bool {
+        self.records.iter().any(|record| record.truth.is_some())
     }
 
     /// Names of the sequences, in the order of their records.
@@ -80,15 +93,4 @@ impl RealResults<'_> {
         names.dedup();
         names
     }
-
-    /// Letters of the lab sequences that have records, in the paper's order.
-    fn letters(&self) -> Vec<&'static str> {
-        let known = self.sequences();
-        let letters = Sequence::lab_names().filter(|name| known.contains(name));
-        letters.filter_map(|name| name.strip_prefix("lab-")).collect()
-    }
-}
-
-fn lab_name(letter: &str) -> String {
-    format!("lab-{letter}")
 }

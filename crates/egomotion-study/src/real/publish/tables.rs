@@ -1,85 +1,50 @@
-//! Tables 3 to 7 in the paper's form, its own values beside ours.
+//! Tables 3 to 7 in the paper's form, for sequences of any origin.
 
-use super::{RealResults, lab_name};
-use crate::components::in_mm_deg;
+use super::RealResults;
 use crate::real::contender::{ImageContender, ImageEstimator};
-use crate::real::printed::{MmDeg, PrintedDepthVelocity, TABLE_3, TABLE_6, TABLE_7, TABLES_4_5};
+use crate::real::printed::PrintedDepthVelocity;
 use crate::real::quantity::Quantity;
 use crate::real::statistics::PooledStatistics;
-use crate::sequences::two_frames;
 use crate::{Cell, Table};
 use egomotion::pipeline::{Approach, Method};
 
-/// How well the images were matched.
-pub(super) fn matching(results: &RealResults<'_>) -> Table {
-    let mut table = Table::new(
-        "real-matching",
-        "What the methods had to work with",
-        "Median errors of computed disparity (before it is rounded) and of computed flow against the exact maps.",
-        &[("sequence", "sequence"), ("disparity_px", "disparity (px)"), ("flow_px", "flow (px)")],
-    );
-    for letter in results.letters() {
-        let median = |quantity| results.lab(letter, None, quantity).map(|found| found.estimate);
-        table.rows.push(vec![
-            letter.into(),
-            median(Quantity::Disparity).into(),
-            median(Quantity::Flow).into(),
-        ]);
-    }
-    table
+/// What the median rows of Tables 3 and 6 hold.
+pub(super) const MEDIANS: &str = "Means over pixels are at the mercy of a few wrong matches; so the row \"median\" below each has \
+     the median over the draws of the median over the pixels: of −VZ, and in the place of ERM of the absolute relative error.";
+
+/// A table of the paper: the stem of its file, its title, and how to read it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Heading<'a> {
+    pub(super) id: &'a str,
+    pub(super) title: &'a str,
+    pub(super) caption: &'a str,
 }
 
-/// Tables 3 to 7.
-pub(super) fn printed(results: &RealResults<'_>) -> Vec<Table> {
-    let turning = |letter: &str| ["A", "B", "C", "D"].contains(&letter);
-    vec![
-        vz(
-            results,
-            ("table-03", "Table 3. Estimation of VZ: differential approach"),
-            Approach::Differential,
-            &TABLE_3,
-        ),
-        phi(
-            results,
-            ("table-04", "Table 4. Estimation of φ, turning: differential approach"),
-            Approach::Differential,
-            turning,
-        ),
-        phi(
-            results,
-            ("table-05", "Table 5. Estimation of φ, translating and mixed: differential approach"),
-            Approach::Differential,
-            |letter| !turning(letter),
-        ),
-        vz(
-            results,
-            ("table-06", "Table 6. Estimation of VZ: discrete approach"),
-            Approach::Discrete,
-            &TABLE_6,
-        ),
-        phi(
-            results,
-            ("table-07", "Table 7. Estimation of φ: discrete approach"),
-            Approach::Discrete,
-            |_| true,
-        ),
-    ]
+/// A sequence in Table 3 or 6.
+pub(super) struct DepthVelocityEntry<'a> {
+    /// Its name in the table.
+    pub(super) label: &'a str,
+    /// The name in its records.
+    pub(super) sequence: String,
+    /// Whether VZ is much the same all over the image: then its mean is given, and the signed ERM.
+    pub(super) constant: bool,
+    /// The paper's values.
+    pub(super) paper: Option<&'a PrintedDepthVelocity>,
+    /// Our rows: which pixels count.
+    pub(super) sources: &'a [(&'static str, Quantity)],
 }
 
-/// Table 3 or 6: three rows for each sequence.
-fn vz(
+/// Table 3 or 6: the paper's row, then two rows for each choice of pixels.
+pub(super) fn vz(
     results: &RealResults<'_>,
-    (id, title): (&str, &str),
+    heading: Heading<'_>,
     approach: Approach,
-    printed: &[PrintedDepthVelocity],
+    entries: &[DepthVelocityEntry<'_>],
 ) -> Table {
     let mut table = Table::new(
-        id,
-        title,
-        "As in the paper: −VZ in mm per frame for E to M, whose ERM is signed; in A to D VZ varies from point to point \
-         and ERM is absolute. \"Here\" counts pixels whose neighbours lie on one surface and which both cameras see, \
-         \"here, anywhere\" all that were measured. The last column of each group is maximum likelihood, which \
-         the paper did not have.",
+        heading.id,
+        heading.title,
+        heading.caption,
         &[
             ("sequence", "sequence"),
             ("source", ""),
@@ -100,85 +65,91 @@ fn vz(
         ImageContender::new(approach, Method::Dv, ImageEstimator::Pixel),
         ImageContender::BEST,
     ];
-    let letters = results.letters();
-    for row in printed.iter().filter(|row| letters.contains(&row.letter)) {
-        let constant = row.true_mm.is_some();
-        let mut cells: Vec<Cell> = vec![row.letter.into(), "paper".into()];
-        let pair = |pair: [f64; 2]| [pair[0].into(), pair[1].into(), Cell::Empty];
-        cells.extend(row.estimated_mm.map_or([Cell::Empty, Cell::Empty, Cell::Empty], pair));
-        cells.push(row.true_mm.into());
-        cells.extend(pair(row.erm_percent).into_iter().chain(pair(row.std_percent)));
-        table.rows.push(cells);
-        for (source, quantity) in [("here", Quantity::Vz), ("here, anywhere", Quantity::VzAnywhere)] {
-            let found = contenders.map(|contender| results.lab(row.letter, Some(contender), quantity));
-            let each = |value: fn(&PooledStatistics) -> Option<f64>| {
-                found.each_ref().map(|found| Cell::from(found.as_ref().and_then(value)))
-            };
-            let mut cells: Vec<Cell> = vec![row.letter.into(), source.into()];
-            if constant {
-                cells.extend(each(|found| Some(-found.estimate)));
-                cells.push(found[0].as_ref().map(|found| -found.truth).into());
-                cells.extend(each(|found| found.erm_signed));
-            } else {
-                cells.extend(vec![Cell::Empty; 4]);
-                cells.extend(each(|found| found.erm_abs));
-            }
-            cells.extend(each(|found| found.std_percent));
-            table.rows.push(cells);
+    for entry in entries {
+        table.rows.extend(entry.paper.map(papers_row));
+        for (source, quantity) in entry.sources {
+            let found = contenders.map(|contender| results.get(&entry.sequence, Some(contender), *quantity));
+            table.rows.extend(mean_and_median(entry, source, &found));
         }
     }
     table
 }
 
+fn papers_row(row: &PrintedDepthVelocity) -> Vec<Cell> {
+    let pair = |pair: [f64; 2]| [pair[0].into(), pair[1].into(), Cell::Empty];
+    let mut cells: Vec<Cell> = vec![row.letter.into(), "paper".into()];
+    cells.extend(row.estimated_mm.map_or([Cell::Empty, Cell::Empty, Cell::Empty], pair));
+    cells.push(row.true_mm.into());
+    cells.extend(pair(row.erm_percent).into_iter().chain(pair(row.std_percent)));
+    cells
+}
+
+/// The means of three contenders, and below them the medians.
+fn mean_and_median(
+    entry: &DepthVelocityEntry<'_>,
+    source: &str,
+    found: &[Option<PooledStatistics>; 3],
+) -> [Vec<Cell>; 2] {
+    let each = |value: fn(&PooledStatistics) -> Option<f64>| {
+        found.each_ref().map(|found| Cell::from(found.as_ref().and_then(value)))
+    };
+    let empty = || [Cell::Empty, Cell::Empty, Cell::Empty];
+    let truth = found.iter().flatten().find_map(|found| found.truth).filter(|_| entry.constant);
+    let row = |name: &str, groups: [[Cell; 3]; 3]| -> Vec<Cell> {
+        let [estimated, erm, std] = groups;
+        let mut cells: Vec<Cell> = vec![entry.label.into(), name.into()];
+        cells.extend(estimated);
+        cells.push(truth.map(|truth| -truth).into());
+        cells.extend(erm.into_iter().chain(std));
+        cells
+    };
+    let (mean, median, erm) = if entry.constant {
+        let signed = each(|found| found.erm_signed.map(|erm| erm.mean));
+        (each(|found| Some(-found.estimate)), each(|found| Some(-found.median)), signed)
+    } else {
+        (empty(), empty(), each(|found| found.erm_abs.map(|erm| erm.mean)))
+    };
+    [
+        row(source, [mean, erm, each(|found| found.std_percent)]),
+        row(&format!("{source}, median"), [median, each(|found| found.erm_median), empty()]),
+    ]
+}
+
+/// A sequence in Table 4, 5 or 7.
+pub(super) struct MotionEntry<'a> {
+    /// Its name in the table.
+    pub(super) label: &'a str,
+    /// The name in its records.
+    pub(super) sequence: String,
+    /// Rows above ours: the truth and the paper's values.
+    pub(super) above: Vec<(&'static str, [Option<f64>; 6])>,
+}
+
 /// Table 4, 5 or 7: the truth, the paper's estimates, ours.
-fn phi(
+pub(super) fn phi(
     results: &RealResults<'_>,
-    (id, title): (&str, &str),
+    heading: Heading<'_>,
     approach: Approach,
-    chosen: impl Fn(&str) -> bool,
+    entries: &[MotionEntry<'_>],
 ) -> Table {
     let mut columns = vec![("sequence", "sequence"), ("row", "")];
     columns.extend(Quantity::PHI.map(|quantity| (quantity.name(), quantity.heading())));
-    let mut table = Table::new(
-        id,
-        title,
-        "mm and degrees per frame, of the camera between the two. Ours: mean ± standard deviation from draw to draw. The paper \
-         gives one estimate for each sequence, and does not say whether by least squares or by least median of \
-         squares.",
-        &columns,
-    );
-    for letter in results.letters().into_iter().filter(|letter| chosen(letter)) {
-        for (name, values) in printed_rows(letter, approach) {
-            let mut cells: Vec<Cell> = vec![letter.into(), name.into()];
+    let mut table = Table::new(heading.id, heading.title, heading.caption, &columns);
+    for entry in entries {
+        for (name, values) in &entry.above {
+            let mut cells: Vec<Cell> = vec![entry.label.into(), (*name).into()];
             cells.extend(values.map(Cell::from));
             table.rows.push(cells);
         }
         for contender in contenders(approach) {
-            let mut cells: Vec<Cell> = vec![letter.into(), contender.label().into()];
-            cells.extend(
-                Quantity::PHI.map(|quantity| {
-                    mean_and_scatter(results.lab(letter, Some(contender), quantity), quantity)
-                }),
-            );
+            let mut cells: Vec<Cell> = vec![entry.label.into(), contender.label().as_str().into()];
+            cells.extend(Quantity::PHI.map(|quantity| {
+                mean_scatter_median(results.get(&entry.sequence, Some(contender), quantity), quantity)
+            }));
             table.rows.push(cells);
         }
     }
     table
-}
-
-/// The truth and the paper's values of one sequence.
-fn printed_rows(letter: &str, approach: Approach) -> Vec<(&'static str, MmDeg)> {
-    let mut rows = Vec::new();
-    let sequence = two_frames(&lab_name(letter));
-    rows.extend(sequence.and_then(|s| s.phi_cyclopean(0)).map(|phi| ("exact", in_mm_deg(&phi))));
-    if approach == Approach::Differential {
-        for row in TABLES_4_5.iter().filter(|row| row.letter == letter) {
-            rows.extend([("paper: DCCE", row.dcce), ("paper: DV", row.dv)]);
-        }
-    } else {
-        rows.extend(TABLE_7.iter().filter(|row| row.0 == letter).map(|row| ("paper: estimated", row.1)));
-    }
-    rows
 }
 
 /// The contenders of an approach, in the order of the rows; the best one last.
@@ -193,12 +164,13 @@ pub(super) fn contenders(approach: Approach) -> Vec<ImageContender> {
     methods.iter().flat_map(both).chain([ImageContender::BEST]).collect()
 }
 
-/// Mean ± scatter, with as many digits as the paper prints.
-pub(super) fn mean_and_scatter(found: Option<PooledStatistics>, quantity: Quantity) -> Cell {
+/// Mean ± scatter (median), with as many digits as the paper prints.
+fn mean_scatter_median(found: Option<PooledStatistics>, quantity: Quantity) -> Cell {
     let Some(found) = found else { return Cell::Empty };
     let digits = if matches!(quantity, Quantity::Tx | Quantity::Ty | Quantity::Tz) { 2 } else { 3 };
     // One digit more where the scatter would vanish.
-    let digits = digits + i32::from(found.scatter < 2.0 * 0.1f64.powi(digits));
-    let estimate = format!("{:.*}", digits as usize, found.estimate).replace('-', "−");
-    Cell::Text(format!("{estimate} ± {:.*}", digits as usize, found.scatter))
+    let digits = digits + usize::from(found.scatter < 2.0 * 0.1f64.powi(digits as i32));
+    let [estimate, median] =
+        [found.estimate, found.median].map(|value| format!("{value:.digits$}").replace('-', "−"));
+    Cell::Text(format!("{estimate} ± {:.digits$} ({median})", found.scatter))
 }
