@@ -133,6 +133,16 @@ impl Study for OneSetting {
     }
 }
 
+/// The unit of a quantity's errors in a file; `None` of what is no quantity, or has no errors.
+fn unit(all: &[&QuantityErrors], quantity: &str) -> Option<&'static str> {
+    let found = all.iter().filter(|errors| errors.quantity == quantity).find_map(|e| e.tally.statistics())?;
+    Some(match (found.erm_abs, quantity.starts_with('w')) {
+        (Some(_), _) => "percent",
+        (None, true) => "deg",
+        (None, false) => "mm",
+    })
+}
+
 /// ERM of each quantity, EAM where the truth is zero: one row for each contender.
 fn overview(methods: &[SensitivityRecord], bound: &[SensitivityRecord]) -> Table {
     let columns: Vec<(&str, &str)> =
@@ -143,6 +153,11 @@ fn overview(methods: &[SensitivityRecord], bound: &[SensitivityRecord]) -> Table
     let caption = "Mean of |error| in percent of the truth; in mm or degrees where the truth is zero.";
     let mut table = Table::new("overview", "Every contender at this setting", caption, &columns);
     let all: Vec<&QuantityErrors> = methods.iter().chain(bound).map(|record| &record.errors).collect();
+    for column in &mut table.columns {
+        if let Some(unit) = unit(&all, &column.name) {
+            column.name = format!("{}_{unit}", column.name);
+        }
+    }
     let mut seen = Vec::new();
     for errors in &all {
         let contender = errors.contender();
