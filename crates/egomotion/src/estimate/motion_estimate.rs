@@ -78,7 +78,7 @@ impl MotionEstimate {
     }
 
     /// φ where the unknowns were (τ, w) of [`CayleyMotion`].
-    pub(crate) fn from_cayley(self) -> Self {
+    pub(crate) fn into_phi(self) -> Self {
         let cayley = CayleyMotion::from_vector(&self.theta.mean);
         self.transformed(cayley.twist().vector(), &cayley.twist_jacobian())
     }

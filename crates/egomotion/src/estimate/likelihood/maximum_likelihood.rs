@@ -280,8 +280,7 @@ struct Accepted {
 impl Accepted {
     /// Whether the likelihood falls from here to a place of this cost.
     fn falls_to(&self, cost: f64, used: usize) -> bool {
-        // NaN is no rise either.
-        !(cost <= self.cost + COST_SLACK * used as f64)
+        cost.is_nan() || cost > self.cost + COST_SLACK * used as f64
     }
 
     fn stepped(&self, delta: &Vector6<f64>) -> Twist {

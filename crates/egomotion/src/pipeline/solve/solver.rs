@@ -202,7 +202,7 @@ impl<'a> Solver<'a> {
             let z = depth.point.z;
             depth.scaled(-1.0 / (z * z))
         });
-        Ok(two_step(&depth, &image, |rows| self.fit(rows))?.from_cayley())
+        Ok(two_step(&depth, &image, |rows| self.fit(rows))?.into_phi())
     }
 
     /// Binocular flow and image flow at once: rows in metres and in pixels only add up in units of their σ.
@@ -226,7 +226,7 @@ impl<'a> Solver<'a> {
         let (depth, mut rows) = self.displacement_rows(tracks, |depth| depth);
         rows.extend(depth);
         let start = CayleyMotion::from_twist(self.start).vector();
-        Ok(self.fit_weighted(&rows, &start)?.estimate(&rows).from_cayley())
+        Ok(self.fit_weighted(&rows, &start)?.estimate(&rows).into_phi())
     }
 
     /// The rows of depth, in the units that `scaled` gives them, and those of the image.
