@@ -262,6 +262,12 @@ impl FrameMotion {
         self.answer.row_disagreement_px
     }
 
+    /// Why the method does not hold on these frames, where tracked corners contradict its answer; None where they do not.
+    #[getter]
+    fn contradiction(&self) -> Option<String> {
+        self.answer.contradiction.map(|found| found.to_string())
+    }
+
     /// u_left − u_right in pixels.
     #[getter]
     fn disparity<'py>(&self, py: Python<'py>) -> PyResult<Option<Map<'py>>> {

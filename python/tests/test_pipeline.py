@@ -139,6 +139,7 @@ def test_the_nearest_obstacle_has_a_time_and_a_place() -> None:
     for k in range(2):
         answer = motion.push(*drive.render(k, samples=2), k * drive.interval_s)
     assert answer.impact is not None and answer.no_obstacle_reason is None and answer.impact_map is not None
+    assert answer.contradiction is None
     impact = answer.impact
     assert impact.seconds is not None and impact.interval95_s is not None and impact.bounds is not None
     low, high = impact.interval95_s

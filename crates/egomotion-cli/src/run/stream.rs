@@ -184,7 +184,7 @@ fn line(frame: &FrameResult, viewpoint: Viewpoint<'_>) -> Value {
         "phi": phi,
         "cov": cov,
         "observed": motion.map(|m| m.observed),
-        "warning": frame.motion.contradiction.map(|found| found.cause.to_string()),
+        "warning": frame.motion.contradiction.map(|found| found.to_string()),
         "impact_s": row.impact_s.map(|s| s.map(finite)),
     })
 }

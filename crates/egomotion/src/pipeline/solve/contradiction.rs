@@ -26,6 +26,9 @@ const FAR_PX: f64 = 2.0;
 /// The scene comes nearer fast where it does so by this share of its depth in an interval.
 const FAST_SHARE: f64 = 0.03;
 
+/// Symbols of φ's components.
+const COMPONENTS: [&str; 6] = ["tX", "tY", "tZ", "ΩX", "ΩY", "ΩZ"];
+
 /// An answer that tracked corners contradict.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Contradiction {
@@ -83,6 +86,13 @@ impl fmt::Display for BiasCause {
             }
             Self::Unknown => f.write_str("the observations do not show the cause"),
         }
+    }
+}
+
+impl fmt::Display for Contradiction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = COMPONENTS.get(self.component).copied().unwrap_or("φ");
+        write!(f, "{name} is {:.1} σ from what tracked corners show: {}", self.sigmas, self.cause)
     }
 }
 
