@@ -22,6 +22,8 @@ const REFIT_TOLERANCE: f64 = 1e-3;
 /// A direction is determined by the kept rows when they have at least this share of the information of all rows whose
 /// residuals their own σ explains: less means that the search has chosen rows which do not speak of it.
 const LEAST_KEPT_SHARE: f64 = 0.05;
+/// The median of the rows' own σ is that of about so many: its error is then some percent.
+const SCALE_ROWS: usize = 4096;
 /// Least squared residual that makes an outlier: residuals of an exact fit are rounding errors, and a scale of zero
 /// must not reject them all.
 const LEAST_CUT2: f64 = 1e-24;
@@ -116,7 +118,8 @@ fn are_rounded<const N: usize>(rows: &[Row<N>]) -> bool {
 
 /// The median of the rows' own σ, in units of their weighted residuals.
 fn own_scale<const N: usize>(rows: &[Row<N>], weighting: Weighting) -> f64 {
-    let mut own: Vec<f64> = rows.iter().map(|row| weighting.of(row).sqrt() * row.sigma).collect();
+    let few = rows.iter().step_by(rows.len().div_ceil(SCALE_ROWS).max(1));
+    let mut own: Vec<f64> = few.map(|row| weighting.of(row).sqrt() * row.sigma).collect();
     let middle = median(&mut own);
     if middle.is_finite() { middle } else { 0.0 }
 }
@@ -170,7 +173,7 @@ impl<const N: usize> Refitting<'_, N> {
                 break;
             }
         }
-        let (theta, observability) = self.judged(&fit.0, &equations, fit.1, scale)?;
+        let (theta, observability) = self.judged(fit, &equations, &weights)?;
         let inliers = weights.iter().filter(|&&w| w > 0.0).count();
         Ok(LinearFit { theta, weights, observability, bread: None, inliers, residual_scale: scale })
     }
@@ -178,18 +181,20 @@ impl<const N: usize> Refitting<'_, N> {
     /// The answer without directions of which hardly any but rejected rows speak that their own σ would explain.
     fn judged(
         &self,
-        theta: &SVector<f64, N>,
+        (theta, observability): (SVector<f64, N>, Observability),
         kept: &NormalEquations<N>,
-        observability: Observability,
-        scale: f64,
+        weights: &[f64],
     ) -> Result<(SVector<f64, N>, Observability), Unsolvable> {
-        let explained = |row: &Row<N>| {
-            let weight = self.weighting.of(row);
-            let limit = self.options.cut * scale.max(weight.sqrt() * row.sigma);
-            if weight * row.residual(theta).powi(2) <= limit * limit { weight } else { 0.0 }
+        let explained = |(row, kept): &(&Row<N>, &f64)| {
+            **kept == 0.0 && row.residual(&theta).abs() <= self.options.cut * row.sigma
         };
-        let weights: Vec<f64> = self.rows.par_iter().with_min_len(STRIP).map(explained).collect();
-        let all = NormalEquations::in_strips(self.rows, &weights).information;
+        let rejected = self.rows.iter().zip(weights).filter(explained);
+        let rejected = rejected.map(|(row, _)| (row, self.weighting.of(row)));
+        let rejected = NormalEquations::of_weighted_rows(rejected);
+        if rejected.rows == 0 {
+            return Ok((theta, observability));
+        }
+        let all = kept.information + rejected.information;
         let observability = observability
             .exceeding(|direction: &SVector<f64, N>| LEAST_KEPT_SHARE * direction.dot(&(all * direction)))?;
         Ok((observability.solve(&kept.information, &kept.moment)?, observability))
