@@ -40,6 +40,17 @@ pub(crate) fn required(name: &str, size_px: Option<(usize, usize)>) -> Result<Se
     found.ok_or_else(|| NoSequence { name: name.to_owned(), size_px })
 }
 
+/// (sequence, first pair) of each part of a study of so many pairs of each sequence.
+pub(crate) fn pair_parts(sequences: &[String], pairs: usize, pairs_per_part: usize) -> Vec<(&str, usize)> {
+    let starts = || (0..pairs).step_by(pairs_per_part);
+    sequences.iter().flat_map(|name| starts().map(move |start| (name.as_str(), start))).collect()
+}
+
+/// Names of those parts.
+pub(crate) fn pair_part_names(parts: Vec<(&str, usize)>) -> Vec<String> {
+    parts.into_iter().map(|(name, start)| format!("{name} from pair {start}")).collect()
+}
+
 /// The names as a study's settings hold them.
 pub(crate) fn owned<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<String> {
     names.into_iter().map(str::to_owned).collect()

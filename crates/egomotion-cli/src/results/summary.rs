@@ -19,15 +19,6 @@ const WARNED_ROW_DISAGREEMENT_PX: f64 = 0.25;
 /// Share of the answered motions that corners contradict from which on the user is warned: chance alone contradicts
 /// hardly any.
 const WARNED_SHARE_CONTRADICTED: f64 = 0.1;
-/// Name, factor and unit of φ's components as people read them.
-const COMPONENTS: [(&str, f64, &str); 6] = [
-    ("tX", 1.0, "m"),
-    ("tY", 1.0, "m"),
-    ("tZ", 1.0, "m"),
-    ("ΩX", 180.0 / std::f64::consts::PI, "°"),
-    ("ΩY", 180.0 / std::f64::consts::PI, "°"),
-    ("ΩZ", 180.0 / std::f64::consts::PI, "°"),
-];
 
 /// Number of rows by their `status`.
 pub type StatusCounts = BTreeMap<String, usize>;
@@ -163,14 +154,16 @@ fn biased(outcome: &Outcome) -> Option<String> {
     let middle = |value: fn(&Contradiction) -> f64| {
         egomotion::metrics::quantile(&of_it.iter().map(value).collect::<Vec<f64>>(), 0.5)
     };
-    let (name, factor, unit) = COMPONENTS[component];
+    let (factor, unit) = if component < 3 { (1.0, "m") } else { (1f64.to_degrees(), "°") };
+    let typical = of_it.get(of_it.len() / 2)?;
     Some(format!(
         "The method does not hold on this recording. In {} of {answered} motions tracked corners contradict it, most \
-         often in {name}: {:.3} {unit} an interval in place of {:.3}. The cause: {}. Use --method ml.",
+         often in {}: {:.3} {unit} an interval in place of {:.3}. The cause: {}. Use --method ml.",
         found.len(),
+        typical.symbol(),
         middle(|c| c.found)? * factor,
         middle(|c| c.expected)? * factor,
-        of_it.get(of_it.len() / 2)?.cause,
+        typical.cause,
     ))
 }
 

@@ -19,7 +19,7 @@ pub use coverage::{CoverageBySigma, CoverageCounts};
 pub use depth_camera::DepthKind;
 
 use crate::range::{COUNTS, OutOfRange, sequences, size, within};
-use crate::sequences::{NoSequence, PAPER_SEQUENCES, owned, required};
+use crate::sequences::{NoSequence, PAPER_SEQUENCES, owned, pair_part_names, pair_parts, required};
 use crate::{Publication, Study};
 use egomotion::pipeline::Observe;
 use egomotion::pipeline::PipelineError;
@@ -108,8 +108,7 @@ pub struct ConsistencyRecord {
 impl Consistency {
     /// (sequence, first pair) of each part.
     fn chunks(&self) -> Vec<(&str, usize)> {
-        let starts = || (0..self.pairs).step_by(PAIRS_PER_PART);
-        self.sequences.iter().flat_map(|name| starts().map(move |start| (name.as_str(), start))).collect()
+        pair_parts(&self.sequences, self.pairs, PAIRS_PER_PART)
     }
 }
 
@@ -128,8 +127,7 @@ impl Study for Consistency {
     }
 
     fn parts(&self) -> Vec<String> {
-        let name = |(name, start): (&str, usize)| format!("{name} from pair {start}");
-        self.chunks().into_iter().map(name).collect()
+        pair_part_names(self.chunks())
     }
 
     fn run(&self, part: usize) -> Result<Vec<ConsistencyRecord>, ConsistencyError> {

@@ -13,7 +13,7 @@ use thiserror::Error;
 
 use crate::consistency::pair::RandomPair;
 use crate::range::{COUNTS, OutOfRange, sequences, size, within};
-use crate::sequences::{NoSequence, PAPER_SEQUENCES, owned, required};
+use crate::sequences::{NoSequence, PAPER_SEQUENCES, owned, pair_part_names, pair_parts, required};
 use crate::{Publication, Study};
 use egomotion::pipeline::{Approach, Config, EstimatorKind, Method};
 use egomotion::sim::Sequence;
@@ -98,8 +98,7 @@ pub struct ReliabilityRecord {
 impl Reliability {
     /// (sequence, first pair) of each part.
     fn chunks(&self) -> Vec<(&str, usize)> {
-        let starts = || (0..self.pairs).step_by(PAIRS_PER_PART);
-        self.sequences.iter().flat_map(|name| starts().map(move |start| (name.as_str(), start))).collect()
+        pair_parts(&self.sequences, self.pairs, PAIRS_PER_PART)
     }
 }
 
@@ -118,8 +117,7 @@ impl Study for Reliability {
     }
 
     fn parts(&self) -> Vec<String> {
-        let name = |(name, start): (&str, usize)| format!("{name} from pair {start}");
-        self.chunks().into_iter().map(name).collect()
+        pair_part_names(self.chunks())
     }
 
     fn run(&self, part: usize) -> Result<Vec<ReliabilityRecord>, ReliabilityError> {

@@ -102,7 +102,7 @@ impl Observability {
         Ok(found)
     }
 
-    /// The same with directions as undetermined whose information does not exceed `least` of them.
+    /// The same, but a direction counts as undetermined too where its information is no more than `least` of it.
     ///
     /// # Errors
     /// [`Unsolvable::Unobservable`] when no direction is left.

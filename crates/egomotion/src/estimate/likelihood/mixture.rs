@@ -280,8 +280,8 @@ mod tests {
             for q in [0.1, 3.0, 22.0, 60.0] {
                 let numeric = (mixture.cost(q + 1e-5) - mixture.cost(q - 1e-5)) / 2e-5;
                 // Outliers' own density falls too, but tells nothing of the motion.
-                let outlier = (1.0 - (if mixture.odds > 0.0 { mixture.inlier(q) } else { 1.0 })) * DIMENSION
-                    / (OUTLIER_CORE_Q + q);
+                let outlier_share = if mixture.has_outliers() { 1.0 - mixture.inlier(q) } else { 0.0 };
+                let outlier = outlier_share * DIMENSION / (OUTLIER_CORE_Q + q);
                 let weight = mixture.weight(q).0;
                 assert!((numeric - outlier - weight).abs() < 1e-6, "{mixture:?} {q}: {numeric} {weight}");
             }

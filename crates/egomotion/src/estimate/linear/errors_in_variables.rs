@@ -8,9 +8,10 @@
 //!
 //! it is consistent (W. A. Fuller, "Measurement Error Models", 1987). N follows by one Jacobian from what was measured.
 //! Rows are scaled to disparity, by 1/Z², where noise is the same everywhere; further weights would come from the same
-//! noise. Where residuals are smaller than they would be by the stated noise, all of it is taken as smaller by as much
-//! (Fuller: error variances known but for a factor). What is left is the error of differences in place of derivatives, of third order where a surface is curved
-//! along the way a point goes in an interval: no noise model tells of it, but the scatter over blocks does.
+//! noise. Where residuals are clearly smaller than the stated noise would make them, all of it is taken as smaller by as
+//! much (Fuller: error variances known but for a factor). What is left is the error of differences in place of
+//! derivatives, of third order where a surface is curved along the way a point goes in an interval: no noise model tells of
+//! it, but the scatter over blocks does.
 //!
 //! Noise alone fills the plain normal equations up to full rank. A direction is determined only where what the correction
 //! leaves exceeds its own scatter over the blocks.

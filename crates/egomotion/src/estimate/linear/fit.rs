@@ -51,8 +51,8 @@ pub struct LinearFit<const N: usize> {
 }
 
 impl<const N: usize> LinearFit<N> {
-    /// The fit without directions of which the noise of the coefficients may speak alone; `noise` is the covariance of
-    /// the i-th row's coefficients, N×N.
+    /// The same fit, but a direction counts as undetermined where the noise of the coefficients alone may determine it;
+    /// `noise` is the covariance of the i-th row's coefficients, N×N.
     ///
     /// Noise fills the normal equations up to full rank: along a direction x that no row determines,
     /// xᵀ (Σ w a aᵀ) x is Σ w xᵀ N x, give or take its own scatter. Where residuals are smaller than their σ, so is the

@@ -178,7 +178,8 @@ impl<const N: usize> Refitting<'_, N> {
         Ok(LinearFit { theta, weights, observability, bread: None, inliers, residual_scale: scale })
     }
 
-    /// The answer without directions of which hardly any but rejected rows speak that their own σ would explain.
+    /// The same answer, but a direction counts as undetermined where nearly all that determines it are rejected rows whose
+    /// own σ explains their residual.
     fn judged(
         &self,
         (theta, observability): (SVector<f64, N>, Observability),

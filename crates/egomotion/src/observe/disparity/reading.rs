@@ -12,8 +12,8 @@ const RADIUS: usize = 2;
 const STEEPEST_SURFACE: f64 = 1.0;
 /// Noise that still belongs to a surface, in standard deviations.
 const SURFACE_NOISE_SIGMAS: f64 = 3.0;
-/// Half the side of the window of [`DisparityMap::slope`], in pixels: of a surface's curvature its symmetric window sees
-/// nothing but the third order, and its noise is a tenth of that of a difference over two pixels.
+/// Half the side of the window of [`DisparityMap::slope`], in pixels. A larger one has less noise, and more of a curved
+/// surface's third derivative. With noise of correlation 0.6 over two pixels the variance is a tenth of a difference's.
 const SLOPE_RADIUS: usize = 4;
 /// A pixel belongs to the surface of a slope that lies off its plane by no more than this, in pixels, beside noise: what a
 /// curved surface does within the window.
@@ -21,7 +21,8 @@ const CURVED_PX: f64 = 0.25;
 /// Variance of the slope of a plane through the small window, in units of σ²: 9 pixels share an error, and x² is 2 in the
 /// mean over 25 of them.
 const NEAR_SLOPE_VARIANCE: f64 = CORRELATION_AREA_PX / 50.0;
-/// Least share of the window that a slope is made of: of less than half the curvature does not cancel.
+/// Least share of the window that a slope is made of. Curvature cancels where both sides are seen; at half of the window
+/// it would not.
 const LEAST_SLOPE_SHARE: f64 = 0.6;
 /// Fewest pixels that make a slope.
 const FEWEST_SLOPE_PIXELS: f64 = 6.0;

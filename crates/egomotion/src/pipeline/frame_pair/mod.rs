@@ -84,7 +84,7 @@ impl<'a> FramePair<'a> {
             let start = corners.motion.as_ref().map_err(|why| *why)?;
             solve(&observed, &self.interval, Some(start))
         });
-        let contradiction = self.contradiction(motion.as_ref().ok(), corners, &observed);
+        let contradiction = self.contradiction(motion.as_ref().ok(), || self.refined(corners), &observed);
         let obstacle = interpret::tracks(&corners.tracks, motion.as_ref().ok(), rows, &self.interval);
         PairAnswer {
             motion: motion.map_err(Unanswered::from),
@@ -103,14 +103,13 @@ impl<'a> FramePair<'a> {
         space: &mut FlowSpace,
         stages: &mut StageTimes,
     ) -> Option<(PairAnswer, FlowField, MotionMaps)> {
-        let start = timed(&mut stages.tracks_ms, || Some(self.refined(corners)?.phi()));
+        let refined = timed(&mut stages.tracks_ms, || self.refined(corners));
+        let start = refined.as_ref().map(MotionEstimate::phi);
         let flows = timed(&mut stages.flow_ms, || self.flows(start.as_ref(), space))?;
         let fields = self.observe(&flows)?;
-        let motion = timed(&mut stages.estimate_ms, || {
-            solve(&Observed::Fields(fields, &corners.tracks), &self.interval, start.as_ref())
-        });
         let observed = Observed::Fields(fields, &corners.tracks);
-        let contradiction = self.contradiction(motion.as_ref().ok(), corners, &observed);
+        let motion = timed(&mut stages.estimate_ms, || solve(&observed, &self.interval, start.as_ref()));
+        let contradiction = self.contradiction(motion.as_ref().ok(), || refined, &observed);
         let Meaning { maps, moving, obstacle } = timed(&mut stages.maps_ms, || {
             let motion = motion.as_ref().ok();
             interpret::fields(&fields, self.images(), &corners.tracks, motion, rows, &self.interval)
@@ -129,11 +128,11 @@ impl<'a> FramePair<'a> {
     fn contradiction(
         &self,
         motion: Option<&MotionEstimate>,
-        corners: &FollowedCorners,
+        by_corners: impl FnOnce() -> Option<MotionEstimate>,
         observed: &Observed<'_>,
     ) -> Option<Contradiction> {
         let motion = motion.filter(|_| self.interval.plan.equations.are_linear())?;
-        contradiction(motion, &self.refined(corners)?, observed, &self.interval)
+        contradiction(motion, &by_corners()?, observed, &self.interval)
     }
 
     /// What every pixel shows: disparity of both frames, and the flows between them.

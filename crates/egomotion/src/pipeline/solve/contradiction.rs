@@ -89,10 +89,16 @@ impl fmt::Display for BiasCause {
     }
 }
 
+impl Contradiction {
+    /// Symbol of the component: tX … ΩZ.
+    pub fn symbol(&self) -> &'static str {
+        COMPONENTS.get(self.component).copied().unwrap_or("φ")
+    }
+}
+
 impl fmt::Display for Contradiction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = COMPONENTS.get(self.component).copied().unwrap_or("φ");
-        write!(f, "{name} is {:.1} σ from what tracked corners show: {}", self.sigmas, self.cause)
+        write!(f, "{} is {:.1} σ from what tracked corners show: {}", self.symbol(), self.sigmas, self.cause)
     }
 }
 

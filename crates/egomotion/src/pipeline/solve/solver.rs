@@ -139,7 +139,7 @@ impl<'a> Solver<'a> {
         Ok(self.fit(&rows)?.estimate(&rows))
     }
 
-    /// The same, without directions of which the noise of the gradients may speak alone.
+    /// The same, but a direction counts as undetermined where the noise of the gradients alone may determine it.
     ///
     /// # Errors
     /// [`Unsolvable`] when the observations do not determine a motion.
