@@ -209,9 +209,7 @@ impl FrameMotion {
     /// radians; NaN where it is not determined.
     #[getter]
     fn phi<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let component = |i: usize| {
-            self.estimate().filter(|found| found.observed[i]).map_or(f64::NAN, |found| found.theta.mean[i])
-        };
+        let component = |i: usize| self.estimate().map_or(f64::NAN, |found| found.theta.mean[i]);
         PyArray1::from_iter(py, (0..6).map(component))
     }
 

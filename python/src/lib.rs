@@ -6,6 +6,7 @@
 
 mod arrays;
 mod config;
+mod doubt;
 mod error;
 mod estimators;
 mod evaluate;

@@ -8,6 +8,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays;
 use crate::config::{Threads, config};
+use crate::doubt::Doubt;
 use crate::error;
 use crate::frame_motion::FrameMotion;
 use crate::front_end::{precomputed_disparity, precomputed_flow};
@@ -18,6 +19,7 @@ use crate::rig::Rig;
 pub struct StereoMotion {
     motion: Stereo,
     threads: Threads,
+    doubt: Doubt,
 }
 
 #[pymethods]
@@ -44,7 +46,7 @@ impl StereoMotion {
             }
             motion.set_mask(Some(mask));
         }
-        Ok(Self { motion, threads: Threads::new(threads)? })
+        Ok(Self { motion, threads: Threads::new(threads)?, doubt: Doubt::default() })
     }
 
     /// The motion from the last good frame to this one, at `time_s` in seconds.
@@ -80,7 +82,9 @@ impl StereoMotion {
         }
         let frame = Frame { time_s, left, right, disparity, flow: None };
         let motion = &mut self.motion;
-        Ok(FrameMotion::of(self.threads.run(py, || motion.push(frame))))
+        let answer = self.threads.run(py, || motion.push(frame));
+        self.doubt.of(py, &answer)?;
+        Ok(FrameMotion::of(answer))
     }
 }
 
@@ -89,6 +93,7 @@ impl StereoMotion {
 pub struct RgbdMotion {
     motion: Rgbd,
     threads: Threads,
+    doubt: Doubt,
 }
 
 #[pymethods]
@@ -124,7 +129,7 @@ impl RgbdMotion {
             }
         };
         let motion = Rgbd::new(DepthCamera { rig, noise }, config(py, settings)?).map_err(error::value)?;
-        Ok(Self { motion, threads: Threads::new(threads)? })
+        Ok(Self { motion, threads: Threads::new(threads)?, doubt: Doubt::default() })
     }
 
     /// The motion from the last good frame to this one; `depth` (H, W) in metres on the image's pixels, NaN or 0 where
@@ -138,6 +143,8 @@ impl RgbdMotion {
     ) -> PyResult<FrameMotion> {
         let (image, depth) = (arrays::image("image", image)?, arrays::field("depth", depth)?);
         let motion = &mut self.motion;
-        Ok(FrameMotion::of(self.threads.run(py, || motion.push(time_s, image, &depth))))
+        let answer = self.threads.run(py, || motion.push(time_s, image, &depth));
+        self.doubt.of(py, &answer)?;
+        Ok(FrameMotion::of(answer))
     }
 }

@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::config::{Threads, config};
+use crate::doubt::Doubt;
 use crate::error;
 use crate::frame_motion::FrameMotion;
 use crate::rig::Rig;
@@ -96,6 +97,7 @@ pub fn run(
         pipeline,
         trajectory: Trajectory::new(),
         threads,
+        doubt: Doubt::default(),
     })
 }
 
@@ -144,6 +146,7 @@ pub struct Run {
     pipeline: Pipeline,
     trajectory: Trajectory,
     threads: Threads,
+    doubt: Doubt,
 }
 
 #[pymethods]
@@ -175,6 +178,7 @@ impl Run {
             Some((index, truth, pipeline.push(time_s, input)))
         });
         let Some((index, truth, answer)) = pushed else { return Ok(None) };
+        self.doubt.of(py, &answer)?;
         self.trajectory.push(&answer);
         // Where there is no answer the pose follows from the next one.
         let pose =

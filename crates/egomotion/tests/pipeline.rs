@@ -100,6 +100,46 @@ fn skipped_frames_count() {
     assert_eq!((bridge.frame, bridge.reference, bridge.dt_s, code(&bridge)), (2, Some(0), Some(2.0), "ok"));
 }
 
+/// A frame of noise, which has nothing in common with any other.
+fn noise(like: &StereoFrame) -> StereoFrame {
+    let seed = (10.0 * like.time_s) as u32;
+    let grey = |u: usize, v: usize| {
+        let mixed = (u as u32 ^ (v as u32) << 12 ^ seed << 24).wrapping_mul(0x9e37_79b1);
+        ((mixed ^ mixed >> 15).wrapping_mul(0x85eb_ca6b) >> 24) as f32
+    };
+    let image = Grid::from_fn(320, 240, grey);
+    StereoFrame { left: image.clone(), right: image, ..like.clone() }
+}
+
+#[test]
+fn any_number_of_bad_frames_is_bridged() {
+    let sequence = sequence("C", 2);
+    let mut motion = sparse(&sequence);
+    let good = [0, 1].map(|k| frame(&sequence, k));
+    motion.push(good[0].clone());
+    for k in 1..6 {
+        let time_s = f64::from(k);
+        let unanswered = motion.push(noise(&StereoFrame { time_s, ..good[0].clone() }));
+        assert!(unanswered.motion.is_err(), "{k}");
+        assert_eq!((unanswered.reference, motion.reference()), (Some(0), Some(0)), "{k}");
+    }
+    let bridge = motion.push(StereoFrame { time_s: 6.0, ..good[1].clone() });
+    assert_eq!((bridge.frame, bridge.reference, bridge.dt_s), (6, Some(0), Some(6.0)));
+    let error = error_px(&bridge, &sequence.phi(0).unwrap(), sequence.rig.focal_px);
+    assert!(error < CLOSE_PX, "{error}");
+}
+
+#[test]
+fn a_bad_first_frame_is_left() {
+    let sequence = sequence("C", 4);
+    let mut motion = sparse(&sequence);
+    let frames: [StereoFrame; 4] = std::array::from_fn(|k| frame(&sequence, k));
+    motion.push(noise(&frames[0]));
+    let answers = [1, 2, 3].map(|k: usize| motion.push(frames[k].clone()));
+    assert_eq!(answers.each_ref().map(|answer| answer.motion.is_ok()), [false, false, true]);
+    assert_eq!((answers[2].frame, answers[2].reference, motion.reference()), (3, Some(2), Some(3)));
+}
+
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let sequence = sequence("C", 2);

@@ -29,9 +29,8 @@ pub struct Estimate {
 
 impl Estimate {
     pub fn of<const N: usize>(found: &estimate::Estimate<N>) -> Self {
-        let value = |i: usize| if found.observed[i] { found.theta.mean[i] } else { f64::NAN };
         Self {
-            theta: (0..N).map(value).collect(),
+            theta: found.theta.mean.as_slice().to_vec(),
             covariance: found.theta.cov.transpose().as_slice().to_vec(),
             observed: found.observed.to_vec(),
             undetermined: found.undetermined.directions().iter().map(|d| d.as_slice().to_vec()).collect(),

@@ -83,7 +83,7 @@ impl Pipeline {
     pub fn recall(
         &mut self,
         memory: Memory,
-        read: impl FnOnce(usize) -> Option<SourceFrame>,
+        read: impl Fn(usize) -> Option<SourceFrame>,
     ) -> Result<Option<Image>, RecallError> {
         match (self, memory) {
             (Self::Images(images), Memory::Images(memory)) => {
@@ -91,7 +91,9 @@ impl Pipeline {
                 let reference = memory.reference_frame().unwrap_or_default();
                 let again = |k| match read(k).map(|frame| frame.input) {
                     Some(Ok(FrameInput::Images(frame))) => {
-                        left = Some(frame.left.clone());
+                        if k == reference {
+                            left = Some(frame.left.clone());
+                        }
                         Ok(*frame)
                     }
                     Some(input) => Err(reason(input)),

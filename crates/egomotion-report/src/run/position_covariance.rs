@@ -1,6 +1,6 @@
 //! How sure the camera's position is: the covariances of φ, added up along the path.
 
-use egomotion::geometry::{RigidMotion, Twist};
+use egomotion::geometry::RigidMotion;
 use nalgebra::{Matrix3, Matrix6};
 
 use super::report::Report;
@@ -18,7 +18,7 @@ pub(crate) fn covariances(report: &Report<'_>) -> Vec<Option<Matrix3<f64>>> {
             // An interval that does not reach back to the last answer leaves a gap of unknown motion.
             let whole = last_s.is_none_or(|last| row.time_s - dt <= last + 1e-6 * dt.abs().max(1e-3));
             let known = whole && motion.theta.cov.iter().all(|v| v.is_finite());
-            let phi = Twist::from_vector(&motion.theta.mean);
+            let phi = motion.phi_or_zero();
             let by_phi = adjoint(pose) * phi.left_jacobian();
             sum = sum.filter(|_| known).map(|s| s + by_phi * motion.theta.cov * by_phi.transpose());
         }

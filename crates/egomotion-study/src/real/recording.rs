@@ -63,7 +63,7 @@ impl Triple {
             records.extend(self.vz_record(contender, &map, truth.as_ref()));
         }
         let best = found.motions.iter().find(|(contender, _)| *contender == ImageContender::BEST);
-        let motion = self.truth(Approach::Discrete).or(best.map(|(_, estimate)| estimate.phi()));
+        let motion = self.truth(Approach::Discrete).or(best.map(|(_, estimate)| estimate.phi_or_zero()));
         let share = motion.and_then(|phi| turn_share(&found.matched, &phi));
         records.extend(share.and_then(|s| self.draw.without_truth(None, Quantity::TurnShare, &[s])));
         Ok(records)

@@ -151,7 +151,7 @@ fn records(
     for disparity in [DisparitySource::Exact, DisparitySource::Matched] {
         let observed = ObservedPair::new(&pair, &sequence.rig, sequence.interval_s, disparity)?;
         let corners = observed.by_corners();
-        let start = corners.as_ref().ok().map(|motion| motion.phi());
+        let start = corners.as_ref().ok().map(|motion| motion.phi_or_zero());
         for (method, approach, estimator) in ways() {
             let config = Config { method, approach, estimator, ..Config::default() };
             let answer = observed.solve(&config, start.as_ref());

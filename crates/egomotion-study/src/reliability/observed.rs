@@ -60,7 +60,8 @@ impl ObservedPair {
             DisparitySource::Matched => matched(&frames)?,
             DisparitySource::Exact => [exact(pair, 0), exact(pair, 1)],
         };
-        let start = motion_of(&tracks, rig, interval_s, None).map_or_else(|_| Twist::zero(), |m| m.phi());
+        let start =
+            motion_of(&tracks, rig, interval_s, None).map_or_else(|_| Twist::zero(), |m| m.phi_or_zero());
         let flow = |side: Side| {
             let predicted = rigid_flow(&disparity[0], rig, &start, side);
             let [from, to] = match side {

@@ -175,5 +175,5 @@ fn vz_by_phi(p: &Vector3<f64>) -> RowVector6<f64> {
 fn start(contenders: &[Contender], solve: impl Fn(&Contender) -> Option<MotionEstimate>) -> Twist {
     let plain = |c: &&Contender| c.method == Method::Dv && c.estimator == EstimatorKind::Ls;
     let found = contenders.iter().find(plain).and_then(solve).filter(MotionEstimate::is_complete);
-    found.map_or(Twist::zero(), |found| found.phi())
+    found.map_or(Twist::zero(), |found| found.phi_or_zero())
 }

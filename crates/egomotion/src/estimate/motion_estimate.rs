@@ -15,7 +15,7 @@ const LEAST_PART: f64 = 1e-3;
 /// The answer of an estimator of N unknowns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Estimate<const N: usize> {
-    /// θ̂ and its covariance; an unobserved component has value 0 and an infinite variance.
+    /// θ̂ and its covariance; an unobserved component is NaN, of infinite variance.
     pub theta: Gaussian<N>,
     /// Which components are determined by the data.
     #[serde(with = "serde_array")]
@@ -41,9 +41,14 @@ impl<const N: usize> Estimate<N> {
 }
 
 impl MotionEstimate {
-    /// φ̂.
+    /// φ̂; NaN where it is not observed.
     pub fn phi(&self) -> Twist {
         Twist::from_vector(&self.theta.mean)
+    }
+
+    /// φ̂ with 0 for each component that is not observed: for where a number must stand, as in a chain of poses.
+    pub fn phi_or_zero(&self) -> Twist {
+        Twist::from_vector(&Vector6::from_fn(|i, _| if self.observed[i] { self.theta.mean[i] } else { 0.0 }))
     }
 
     /// How far φ̂ is from another motion, in standard deviations of the component that is furthest.
@@ -52,7 +57,7 @@ impl MotionEstimate {
         (0..6).map(|i| (step[i] / self.theta.sigma(i)).abs()).fold(0.0, f64::max)
     }
 
-    /// The estimate with its components of unbounded variance marked as unobserved: mean 0 and variance infinite.
+    /// The estimate with its components of unbounded variance marked as unobserved.
     ///
     /// # Errors
     /// [`Unsolvable::Unobservable`] when none is left.
@@ -63,7 +68,7 @@ impl MotionEstimate {
                 self.undetermined = self.undetermined.with_components([i]);
             }
             if !self.observed[i] {
-                self.theta.mean[i] = 0.0;
+                self.theta.mean[i] = f64::NAN;
             }
         }
         let any = self.observed.contains(&true);
@@ -74,12 +79,12 @@ impl MotionEstimate {
     /// The same motion and covariance seen by a parallel camera centred at `centre`, equation (4).
     pub fn seen_from(&self, centre: &Vector3<f64>) -> Self {
         let matrix = Twist::seen_from_matrix(centre);
-        self.transformed(matrix * self.theta.mean, &matrix)
+        self.transformed(matrix * self.phi_or_zero().vector(), &matrix)
     }
 
     /// φ where the unknowns were (τ, w) of [`CayleyMotion`].
     pub(crate) fn into_phi(self) -> Self {
-        let cayley = CayleyMotion::from_vector(&self.theta.mean);
+        let cayley = CayleyMotion::from_vector(&self.phi_or_zero().vector());
         self.transformed(cayley.twist().vector(), &cayley.twist_jacobian())
     }
 
@@ -94,7 +99,7 @@ impl MotionEstimate {
             if known { self.theta.cov[(i, j)] } else { 0.0 }
         });
         let known = Gaussian { mean: self.theta.mean, cov: finite }.propagate(mean, jacobian);
-        let mean = Vector6::from_fn(|i, _| if observed[i] { known.mean[i] } else { 0.0 });
+        let mean = Vector6::from_fn(|i, _| if observed[i] { known.mean[i] } else { f64::NAN });
         Self {
             theta: Gaussian { mean, cov: with_unobserved(known.cov, &observed) },
             observed,
@@ -121,7 +126,8 @@ mod tests {
         let known =
             estimate([1.0, f64::INFINITY, 1.0, 1.0, f64::NAN, 1.0]).with_unbounded_unobserved().unwrap();
         assert_eq!(known.observed, [true, false, true, true, false, true]);
-        assert_eq!(known.theta.mean.as_slice(), &[1.0, 0.0, 1.0, 1.0, 0.0, 1.0]);
+        assert_eq!(known.theta.mean.map(f64::is_nan).as_slice(), &[false, true, false, false, true, false]);
+        assert_eq!(known.phi_or_zero().vector().as_slice(), &[1.0, 0.0, 1.0, 1.0, 0.0, 1.0]);
         assert_eq!(known.theta.cov[(4, 4)], f64::INFINITY);
         assert_eq!(estimate([f64::INFINITY; 6]).with_unbounded_unobserved(), Err(Unsolvable::Unobservable));
     }

@@ -10,8 +10,8 @@ use super::answer::{FrameMotion, Unanswered};
 use crate::geometry::Twist;
 use crate::observe::tracks::StereoCorner;
 
-/// After this many good frames without an answer the reference frame itself is given up: it may be the bad one.
-const FAILURES_UNTIL_GIVEN_UP: usize = 2;
+/// After this many good frames without an answer the reference frame may be the bad one: the newest is tried beside it.
+const FAILURES_UNTIL_DOUBTED: usize = 2;
 
 /// A frame that later ones can be matched with.
 pub trait TimedFrame {
@@ -19,15 +19,38 @@ pub trait TimedFrame {
     fn moment(&self) -> (usize, f64);
 }
 
-/// What a pipeline keeps of the frames that it has seen; `F` is what it keeps of the last good one.
+/// The frames that a new one is matched with, in this order.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Earlier<F> {
+    /// The last frame that took part in an answer, or the first of all.
+    pub(super) reference: F,
+    /// The newest frame, once several in a row were in vain matched with the reference.
+    pub(super) newest: Option<F>,
+}
+
+impl<F> Earlier<F> {
+    pub(super) fn only(reference: F) -> Self {
+        Self { reference, newest: None }
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &F> {
+        [&self.reference].into_iter().chain(&self.newest)
+    }
+
+    fn map<G>(self, mut change: impl FnMut(F) -> G) -> Earlier<G> {
+        Earlier { reference: change(self.reference), newest: self.newest.map(change) }
+    }
+}
+
+/// What a pipeline keeps of the frames that it has seen; `F` is what it keeps of one that later ones are matched with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Memory<F> {
     /// Frames pushed or skipped so far.
     frames: usize,
     /// The last time stamp that could be used.
     last_time_s: Option<f64>,
-    /// The frame that the next one is matched with.
-    reference: Option<F>,
+    /// The frames that the next one is matched with.
+    earlier: Option<Earlier<F>>,
     /// Velocity per second of the last answer.
     velocity: Option<Twist>,
     /// Frames since the reference that gave no answer though they were good.
@@ -37,7 +60,7 @@ pub struct Memory<F> {
 impl<F> Memory<F> {
     /// Of no frame yet.
     pub(super) fn new() -> Self {
-        Self { frames: 0, last_time_s: None, reference: None, velocity: None, failures: 0 }
+        Self { frames: 0, last_time_s: None, earlier: None, velocity: None, failures: 0 }
     }
 
     /// Index that the next frame has.
@@ -45,20 +68,23 @@ impl<F> Memory<F> {
         self.frames
     }
 
+    /// The frame that the next one is matched with first.
     pub(super) fn reference(&self) -> Option<&F> {
-        self.reference.as_ref()
+        self.earlier.as_ref().map(|earlier| &earlier.reference)
     }
 
-    pub(super) fn reference_mut(&mut self) -> Option<&mut F> {
-        self.reference.as_mut()
+    pub(super) fn earlier_mut(&mut self) -> impl Iterator<Item = &mut F> {
+        self.earlier
+            .iter_mut()
+            .flat_map(|earlier| [&mut earlier.reference].into_iter().chain(&mut earlier.newest))
     }
 
-    pub(super) fn take_reference(&mut self) -> Option<F> {
-        self.reference.take()
+    pub(super) fn take_earlier(&mut self) -> Option<Earlier<F>> {
+        self.earlier.take()
     }
 
-    pub(super) fn set_reference(&mut self, frame: F) {
-        self.reference = Some(frame);
+    pub(super) fn set_earlier(&mut self, earlier: Earlier<F>) {
+        self.earlier = Some(earlier);
     }
 
     /// Whether a time can follow the last one.
@@ -79,34 +105,48 @@ impl<F> Memory<F> {
         self.velocity.map(|velocity| velocity.scaled(dt_s))
     }
 
-    /// What is left of it when `keep` has taken what it needs of the last good frame.
-    pub(super) fn kept<G>(&self, keep: impl FnOnce(&F) -> G) -> Memory<G> {
+    /// What is left of it when `keep` has taken what it needs of each frame.
+    pub(super) fn kept<G>(&self, keep: impl Fn(&F) -> G) -> Memory<G> {
         let &Self { frames, last_time_s, velocity, failures, .. } = self;
-        let reference = self.reference.as_ref().map(keep);
-        Memory { frames, last_time_s, reference, velocity, failures }
+        let earlier = self.earlier.as_ref().map(|Earlier { reference, newest }| Earlier {
+            reference: keep(reference),
+            newest: newest.as_ref().map(&keep),
+        });
+        Memory { frames, last_time_s, earlier, velocity, failures }
     }
 
-    /// The same memory with something else kept of the last good frame.
-    pub(super) fn map<G>(self, change: impl FnOnce(F) -> G) -> Memory<G> {
-        let Self { frames, last_time_s, reference, velocity, failures } = self;
-        Memory { frames, last_time_s, reference: reference.map(change), velocity, failures }
+    /// The same memory with something else kept of each frame.
+    pub(super) fn map<G>(self, change: impl FnMut(F) -> G) -> Memory<G> {
+        let Self { frames, last_time_s, earlier, velocity, failures } = self;
+        Memory {
+            frames,
+            last_time_s,
+            earlier: earlier.map(|earlier| earlier.map(change)),
+            velocity,
+            failures,
+        }
     }
 
-    /// The memory again, with the last good frame that `restore` makes of what was kept.
+    /// The memory again, with the frames that `restore` makes of what was kept.
     ///
     /// # Errors
     /// Those of `restore`.
-    pub(super) fn restored<G, E>(self, restore: impl FnOnce(F) -> Result<G, E>) -> Result<Memory<G>, E> {
-        let Self { frames, last_time_s, reference, velocity, failures } = self;
-        let reference = reference.map(restore).transpose()?;
-        Ok(Memory { frames, last_time_s, reference, velocity, failures })
+    pub(super) fn restored<G, E>(self, mut restore: impl FnMut(F) -> Result<G, E>) -> Result<Memory<G>, E> {
+        let Self { frames, last_time_s, earlier, velocity, failures } = self;
+        let earlier = match earlier {
+            Some(Earlier { reference, newest }) => {
+                Some(Earlier { reference: restore(reference)?, newest: newest.map(restore).transpose()? })
+            }
+            None => None,
+        };
+        Ok(Memory { frames, last_time_s, earlier, velocity, failures })
     }
 }
 
 impl<F: TimedFrame> Memory<F> {
     /// Count a frame that gives no motion; what it would be matched with stays.
     pub(super) fn skip(&mut self, time_s: f64, why: Unanswered) -> FrameMotion {
-        let reference = self.reference.as_ref().map(F::moment);
+        let reference = self.reference().map(F::moment);
         self.count_unanswered(time_s, reference, why)
     }
 
@@ -122,19 +162,23 @@ impl<F: TimedFrame> Memory<F> {
         FrameMotion::unanswered((frame, time_s), reference, why)
     }
 
-    /// Keep what the next frame needs of an answer, and return the frame that is not needed again.
+    /// Keep what the next frame needs of an answer, and return a frame that is not needed again.
     ///
-    /// After a failure the earlier frame is kept, until too many have failed.
-    pub(super) fn remember(&mut self, answer: &FrameMotion, before: F, here: F) -> F {
+    /// After a failure the reference stays, however many fail: a robot that sees nothing for a while finds itself again.
+    pub(super) fn remember(&mut self, answer: &FrameMotion, earlier: Earlier<F>, here: F) -> Option<F> {
         self.frames += 1;
         self.failures = if answer.motion.is_ok() { 0 } else { self.failures + 1 };
         self.velocity = match (&answer.motion, answer.dt_s) {
             (Ok(motion), Some(dt)) if motion.is_complete() => Some(motion.phi().scaled(1.0 / dt)),
             _ => None,
         };
-        let keep_old = answer.motion.is_err() && self.failures < FAILURES_UNTIL_GIVEN_UP;
-        let (kept, gone) = if keep_old { (before, here) } else { (here, before) };
-        self.reference = Some(kept);
+        let Earlier { reference, newest } = earlier;
+        let (kept, gone) = match (answer.motion.is_ok(), self.failures < FAILURES_UNTIL_DOUBTED) {
+            (true, _) => (Earlier::only(here), Some(reference)),
+            (false, true) => (Earlier { reference, newest }, Some(here)),
+            (false, false) => (Earlier { reference, newest: Some(here) }, newest),
+        };
+        self.earlier = Some(kept);
         gone
     }
 }
@@ -150,6 +194,6 @@ pub struct KeptFrame {
 impl Memory<KeptFrame> {
     /// Index of the frame that the next one is matched with, counted over all frames pushed or skipped.
     pub fn reference_frame(&self) -> Option<usize> {
-        self.reference.as_ref().map(|reference| reference.frame)
+        self.reference().map(|reference| reference.frame)
     }
 }

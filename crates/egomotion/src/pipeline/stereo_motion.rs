@@ -4,9 +4,9 @@ use super::answer::{DenseResults, FrameMotion, Unanswered};
 use super::config::{Config, Observe, PipelineError};
 use super::frame::{Frame, PreparedFrame, erase, erase_partners, sized};
 use super::frame_pair::{Compared, FramePair};
-use super::memory::{KeptFrame, Memory};
+use super::memory::{Earlier, KeptFrame, Memory};
 use super::stages::{StageTimes, timed};
-use crate::geometry::{Grid, StereoRig};
+use crate::geometry::{Grid, StereoRig, Twist};
 use crate::observe::flow::FlowSpace;
 use crate::observe::{DisparityMap, DisparityMatcher, FlowField, StereoPyramid};
 
@@ -16,7 +16,8 @@ pub type StereoMemory = Memory<KeptFrame>;
 /// Turns a sequence of stereo frames into motion.
 ///
 /// Feed it one frame after the other; it keeps the last good frame and what was computed of it. A bad frame gives an
-/// answer that says why, and the next good one is matched with the last good one.
+/// answer that says why, and the next good one is matched with the last good one. When that fails several times in a
+/// row, the newest frame is tried too.
 ///
 /// ```
 /// use egomotion::pipeline::{Config, Observe, StereoFrame, StereoMotion, Unanswered};
@@ -99,13 +100,14 @@ impl StereoMotion {
     /// [`Unanswered::BadImage`] when it is not of the rig's size.
     pub fn set_flow(&mut self, flow: FlowField) -> Result<(), Unanswered> {
         sized("flow", flow.size(), &self.rig)?;
-        if let Some(last) = self.memory.reference_mut() {
+        let next = self.memory.next_frame();
+        if let Some(last) = self.memory.earlier_mut().find(|frame| frame.frame + 1 == next) {
             last.flow = Some(flow);
         }
         Ok(())
     }
 
-    /// The frame that the next one will be matched with.
+    /// The frame that the next one will be matched with first.
     pub fn reference(&self) -> Option<usize> {
         self.memory.reference().map(|reference| reference.frame)
     }
@@ -125,32 +127,39 @@ impl StereoMotion {
         let mut stages = StageTimes::default();
         let blank = frame.is_blank();
         let here = self.prepared(frame, self.memory.next_frame(), &mut stages);
-        let Some(before) = self.memory.take_reference() else {
+        let Some(earlier) = self.memory.take_earlier() else {
             let first = self.skip(here.time_s, Unanswered::First);
-            self.memory.set_reference(here);
+            self.memory.set_earlier(Earlier::only(here));
             return first;
         };
-        if here.repeats(&before, blank) {
-            let repeated = self.skip(here.time_s, Unanswered::RepeatedFrame);
-            self.memory.set_reference(before);
+        let repeats = earlier.iter().any(|before| here.repeats(before, blank));
+        if repeats {
+            self.memory.set_earlier(earlier);
             self.spare = Some(here.images);
-            return repeated;
+            return self.skip(here.time_s, Unanswered::RepeatedFrame);
         }
-        self.compare(before, here, stages)
+        self.answer(earlier, here, stages)
     }
 
-    /// The answer of two frames, and what the next one needs of them.
-    fn compare(
+    /// The answer of a frame and those before, and what the next one needs of them.
+    fn answer(
         &mut self,
-        mut before: PreparedFrame,
+        mut earlier: Earlier<PreparedFrame>,
         here: PreparedFrame,
         mut stages: StageTimes,
     ) -> FrameMotion {
-        let masks = [self.mask.as_ref(), self.mask_right.as_ref()];
-        let pair = FramePair::new(&before, &here, &self.rig, &self.config, masks);
-        let expected = self.memory.expected_motion(here.time_s - before.time_s);
-        let Compared { answer, fields, corners } =
-            pair.compare(expected.as_ref(), &mut self.flow_space, &mut stages);
+        let expected = self.memory.expected_motion(here.time_s - earlier.reference.time_s);
+        let mut compared = self.compare(&earlier.reference, &here, expected.as_ref(), &mut stages);
+        let mut before = &mut earlier.reference;
+        if compared.answer.motion.is_err()
+            && let Some(newest) = &mut earlier.newest
+        {
+            let other = self.compare(newest, &here, None, &mut stages);
+            if other.answer.motion.is_ok() {
+                (compared, before) = (other, newest);
+            }
+        }
+        let Compared { answer, fields, corners } = compared;
         // After an answer the earlier frame is not needed again.
         let disparity =
             if answer.motion.is_ok() { before.disparity.take() } else { before.disparity.clone() };
@@ -158,9 +167,22 @@ impl StereoMotion {
             fields.zip(disparity).map(|((flow, motion), disparity)| DenseResults { disparity, flow, motion });
         let moments = ((before.frame, before.time_s), (here.frame, here.time_s));
         let answer = FrameMotion::of_pair(moments.0, moments.1, answer, dense, stages);
-        let gone = self.memory.remember(&answer, before, PreparedFrame { corners, ..here });
-        self.spare = Some(gone.images);
+        let gone = self.memory.remember(&answer, earlier, PreparedFrame { corners, ..here });
+        self.spare = gone.map(|gone| gone.images);
         answer
+    }
+
+    /// Two frames, and the motion between them if it goes on as it was.
+    fn compare(
+        &mut self,
+        before: &PreparedFrame,
+        here: &PreparedFrame,
+        expected: Option<&Twist>,
+        stages: &mut StageTimes,
+    ) -> Compared {
+        let masks = [self.mask.as_ref(), self.mask_right.as_ref()];
+        let pair = FramePair::new(before, here, &self.rig, &self.config, masks);
+        pair.compare(expected, &mut self.flow_space, stages)
     }
 
     /// What is kept of the frames so far: with it, and the frame that it names, [`StereoMotion::recall`] goes on.
@@ -173,14 +195,15 @@ impl StereoMotion {
     }
 
     /// Go on where a pipeline of the same rig, choices and mask had this memory: every later answer is the same,
-    /// bit for bit. `frame` gives again the one with the index that [`StereoMemory::reference_frame`] names.
+    /// bit for bit. `frame` gives a frame again by its index: the one that [`StereoMemory::reference_frame`] names, and
+    /// after several without an answer one more.
     ///
     /// # Errors
-    /// Why that frame cannot be used; the pipeline then stays as it was.
+    /// Why a frame cannot be used; the pipeline then stays as it was.
     pub fn recall(
         &mut self,
         memory: StereoMemory,
-        frame: impl FnOnce(usize) -> Result<Frame, Unanswered>,
+        mut frame: impl FnMut(usize) -> Result<Frame, Unanswered>,
     ) -> Result<(), Unanswered> {
         self.memory = memory.restored(|kept| -> Result<PreparedFrame, Unanswered> {
             let frame = frame(kept.frame)?;

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::answer::{FrameMotion, PairAnswer, Unanswered};
 use super::config::{Config, ConfigError, Method, Observe, PipelineError};
 use super::interpret;
-use super::memory::{Memory, TimedFrame};
+use super::memory::{Earlier, Memory, TimedFrame};
 use super::plan::Interval;
 use super::solve::{Observed, contradiction, first_motion, refined_motion, solve};
 use super::stages::{StageTimes, timed};
@@ -126,26 +126,41 @@ impl TrackMotion {
         self.memory.set_time(time_s);
         let points = points.iter().filter(|p| p.is_finite()).map(|point| (point.track, *point)).collect();
         let mut here = TrackedFrame { frame: self.memory.next_frame(), time_s, points };
-        let Some(before) = self.memory.take_reference() else {
+        let Some(earlier) = self.memory.take_earlier() else {
             let first = self.skip(time_s, Unanswered::First);
-            self.memory.set_reference(here);
+            self.memory.set_earlier(Earlier::only(here));
             return first;
         };
-        if here.forget_copies(&before) {
-            let (reference, time_s) = (before.moment(), here.time_s);
+        if earlier.iter().fold(false, |copies, before| here.forget_copies(before) || copies) {
+            let (reference, time_s) = (earlier.reference.moment(), here.time_s);
             // New tracks tell of a time that the old ones do not reach: the motion up to it is lost.
-            self.memory.set_reference(if here.points.is_empty() { before } else { here });
+            self.memory.set_earlier(if here.points.is_empty() { earlier } else { Earlier::only(here) });
             return self.memory.count_unanswered(time_s, Some(reference), Unanswered::RepeatedFrame);
         }
-        self.compare(before, here)
+        self.answer(earlier, here)
     }
 
-    /// The answer of two frames, and what the next one needs of them.
-    fn compare(&mut self, before: TrackedFrame, after: TrackedFrame) -> FrameMotion {
+    /// The answer of a frame and those before, and what the next one needs of them.
+    fn answer(&mut self, earlier: Earlier<TrackedFrame>, here: TrackedFrame) -> FrameMotion {
+        let mut answer = self.compare(&earlier.reference, &here);
+        if answer.motion.is_err()
+            && let Some(newest) = &earlier.newest
+        {
+            let other = self.compare(newest, &here);
+            if other.motion.is_ok() {
+                answer = other;
+            }
+        }
+        self.memory.remember(&answer, earlier, here);
+        answer
+    }
+
+    /// The motion between two frames.
+    fn compare(&self, before: &TrackedFrame, after: &TrackedFrame) -> FrameMotion {
         let mut stages = StageTimes::default();
         let dt_s = after.time_s - before.time_s;
         let expected = self.memory.expected_motion(dt_s);
-        let pairs = before.pairs(&after);
+        let pairs = before.pairs(after);
         let tracks: Vec<StereoTrack> = pairs
             .iter()
             .map(|(a, b)| StereoTrack { before: self.located(a), after: self.located(b) })
@@ -167,9 +182,7 @@ impl TrackMotion {
         let motion = motion.map_err(Unanswered::from);
         let answer =
             PairAnswer { motion, row_disagreement_px: rows, contradiction, obstacle, moving: Vec::new() };
-        let answer = FrameMotion::of_pair(before.moment(), after.moment(), answer, None, stages);
-        self.memory.remember(&answer, before, after);
-        answer
+        FrameMotion::of_pair(before.moment(), after.moment(), answer, None, stages)
     }
 
     /// (x, y, d): v is the mean of both images', and u is that of the left one.

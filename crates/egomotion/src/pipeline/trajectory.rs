@@ -31,7 +31,7 @@ impl Trajectory {
         let (Ok(motion), Some(reference), Some(dt)) = (&answer.motion, answer.reference, answer.dt_s) else {
             return;
         };
-        let velocity = motion.phi().scaled(1.0 / dt);
+        let velocity = motion.phi_or_zero().scaled(1.0 / dt);
         let last = self.poses.len() - 1;
         if let Some((from, before)) = self.answered.filter(|(from, _)| *from < reference) {
             let mean = Twist::from_vector(&(0.5 * (before.vector() + velocity.vector())));
@@ -49,7 +49,7 @@ impl Trajectory {
             let share = (self.times_s[k] - start_s) / dt;
             let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
             // The scene moves by exp(φ), so the camera by its inverse.
-            self.poses[k] = start.after(&motion.phi().scaled(share).exp().inverse());
+            self.poses[k] = start.after(&motion.phi_or_zero().scaled(share).exp().inverse());
         }
     }
 

@@ -145,10 +145,10 @@ impl Observability {
         UndeterminedDirections::spanned(free.map(direction), self.null_share.sqrt())
     }
 
-    /// θ as far as it is determined: the unobserved components at zero.
-    pub(crate) fn with_unobserved_zero<const N: usize>(&self, theta: &SVector<f64, N>) -> SVector<f64, N> {
+    /// θ as far as it is determined: the unobserved components NaN.
+    pub(crate) fn with_unobserved_nan<const N: usize>(&self, theta: &SVector<f64, N>) -> SVector<f64, N> {
         let observed: [bool; N] = self.observed();
-        SVector::from_fn(|i, _| if observed[i] { theta[i] } else { 0.0 })
+        SVector::from_fn(|i, _| if observed[i] { theta[i] } else { f64::NAN })
     }
 
     /// The whitening matrix W, N × rank: W Wᵀ is the (pseudo-)inverse of the information.

@@ -148,7 +148,8 @@ pub fn maximum_likelihood<M: LikelihoodTerm>(
         return found;
     }
     let is_astray = |found: &MaximumLikelihood| {
-        median_square(&found.motion.phi(), &few, rig) > ASTRAY_MEDIAN_RATIO * median_square(start, &few, rig)
+        median_square(&found.motion.phi_or_zero(), &few, rig)
+            > ASTRAY_MEDIAN_RATIO * median_square(start, &few, rig)
     };
     let again = match &found {
         Ok(found) => is_astray(found),
@@ -330,7 +331,7 @@ fn finish(
     let freedom = (3 * whole.used).saturating_sub(6).max(1) as f64;
     Ok(MaximumLikelihood {
         motion: Estimate {
-            theta: Gaussian { mean: observability.with_unobserved_zero(&found.phi.vector()), cov },
+            theta: Gaussian { mean: observability.with_unobserved_nan(&found.phi.vector()), cov },
             observed: observability.observed(),
             undetermined: observability.undetermined(),
             rows,

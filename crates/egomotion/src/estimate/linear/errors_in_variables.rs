@@ -212,7 +212,7 @@ fn estimate(
     let scores: Vec<BlockScore<6>> = by_block.iter().filter(|sums| sums.used > 0).map(score).collect();
     Estimate {
         theta: Gaussian {
-            mean: observability.with_unobserved_zero(phi),
+            mean: observability.with_unobserved_nan(phi),
             cov: covariance(&scores, None, &observability),
         },
         observed: observability.observed(),

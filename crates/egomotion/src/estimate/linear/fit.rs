@@ -90,7 +90,7 @@ impl<const N: usize> LinearFit<N> {
         let inverse = self.bread.and_then(|bread| bread.try_inverse());
         let cov = covariance(&scores, inverse.as_ref(), &self.observability);
         Estimate {
-            theta: Gaussian { mean: self.observability.with_unobserved_zero(&self.theta), cov },
+            theta: Gaussian { mean: self.observability.with_unobserved_nan(&self.theta), cov },
             observed: self.observability.observed(),
             undetermined: self.observability.undetermined(),
             rows: rows.len(),

@@ -64,7 +64,7 @@ pub fn two_step(
         cov = with_unobserved(cov, &observed);
     }
     for i in (0..6).filter(|&i| !observed[i]) {
-        mean[i] = 0.0;
+        mean[i] = f64::NAN;
     }
     Ok(Estimate {
         theta: Gaussian { mean, cov },

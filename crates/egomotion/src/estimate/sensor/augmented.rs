@@ -49,7 +49,7 @@ pub(crate) fn augmented_step(
     prior: &SensorPrior,
     blocks: &Blocks,
 ) -> Option<AugmentedStep> {
-    let at = LinearisationPoint::new(found.motion.phi(), rig);
+    let at = LinearisationPoint::new(found.motion.phi_or_zero(), rig);
     let sums = AugmentedSums::by_block(observations, &At { motion: at, errors }, blocks, &found.residuals);
     let by_block: Vec<AugmentedScore> = sums.iter().map(|sums| sums.score(&at, prior)).collect();
     let unit = prior.sigma.map(|sigma| if sigma > 0.0 { sigma.recip() } else { 0.0 });

@@ -104,7 +104,7 @@ impl<'a> FramePair<'a> {
         stages: &mut StageTimes,
     ) -> Option<(PairAnswer, FlowField, MotionMaps)> {
         let refined = timed(&mut stages.tracks_ms, || self.refined(corners));
-        let start = refined.as_ref().map(MotionEstimate::phi);
+        let start = refined.as_ref().map(MotionEstimate::phi_or_zero);
         let flows = timed(&mut stages.flow_ms, || self.flows(start.as_ref(), space))?;
         let fields = self.observe(&flows)?;
         let observed = Observed::Fields(fields, &corners.tracks);

@@ -26,7 +26,7 @@ pub(super) fn still_world<'a>(
 ) -> Option<RigidPrediction<'a>> {
     let motion = motion?;
     let kernel = &interval.config.maximum_likelihood.kernel;
-    let systematic = systematic_response(tracks, interval.rig, &motion.phi(), kernel);
+    let systematic = systematic_response(tracks, interval.rig, &motion.phi_or_zero(), kernel);
     let offset = systematic.map_or_else(DisparityOffset::none, |systematic| DisparityOffset {
         sigma_px: OFFSET_PER_ROW_DISAGREEMENT * row_disagreement_px.unwrap_or(0.0),
         phi_per_px: systematic.phi_per_offset_px,

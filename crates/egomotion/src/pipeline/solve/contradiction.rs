@@ -120,7 +120,7 @@ pub fn contradiction(
         found: found.theta.mean[component],
         expected: corners.theta.mean[component],
         sigmas,
-        cause: cause(&corners.phi(), observed, interval),
+        cause: cause(&corners.phi_or_zero(), observed, interval),
     })
 }
 

@@ -20,7 +20,7 @@ pub(in crate::pipeline) fn first_motion(
     let options = &interval.config.seeded_likelihood();
     let of_most = |tracks: &[StereoTrack]| {
         let start = robust_start(tracks, interval.rig, expected, options)?;
-        Ok(refined_motion(tracks, interval, &start)?.phi())
+        Ok(refined_motion(tracks, interval, &start)?.phi_or_zero())
     };
     let found = of_most(tracks)?;
     let goes_on = |expected| scene_motion(tracks, interval.rig, found, expected, of_most);

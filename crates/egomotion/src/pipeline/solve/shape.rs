@@ -58,7 +58,7 @@ pub(super) fn solve_with_shape(
         let solver = if near { solver.with_tolerance(interval.dt_s) } else { solver };
         let found = solver.round(&all, &mut errors)?;
         let moved = found.moved_from(&phi);
-        phi = found.phi();
+        phi = found.phi_or_zero();
         round += 1;
         if (near && moved.is_finite() && moved < SETTLED_SIGMAS) || round == SHAPE_ROUNDS {
             return Ok(found);

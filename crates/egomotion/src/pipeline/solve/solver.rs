@@ -95,7 +95,7 @@ impl<'a> Solver<'a> {
             let corrected: Vec<SensedTrack> = made.map(|sensed| errors.corrected(&sensed, &at)).collect();
             let found = Solver { start: &start, ..*self }.round(&corrected, &mut errors)?;
             let moved = found.moved_from(&start);
-            start = found.phi();
+            start = found.phi_or_zero();
             round += 1;
             if moved < SETTLED_SIGMAS || round == SENSOR_ROUNDS {
                 return Ok(found);
