@@ -22,8 +22,8 @@ fn frames(sequence: &Sequence) -> Vec<Frame> {
             .expose(&sequence.view(shown).unwrap().render(2), shown as u64);
         let left = match k {
             2 => Image::filled(320, 240, 90.0),
-            // Stripes: good images that have nothing in common with the others.
-            4..7 => Grid::from_fn(320, 240, |u, v| ((u * (k + 3) + v * 3) % 50) as f32),
+            // Noise: good images that have nothing in common with the others.
+            4..7 => Grid::from_fn(320, 240, |u, v| ((u * 7919 + v * 104_729) * (k + 3) % 251) as f32),
             _ => images.left,
         };
         StereoFrame { time_s: sequence.interval_s * k as f64, left, right: images.right }.into()
