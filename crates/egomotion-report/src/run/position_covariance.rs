@@ -44,6 +44,7 @@ fn adjoint(pose: &RigidMotion) -> Matrix6<f64> {
 
 #[cfg(test)]
 pub mod tests {
+    use egomotion::geometry::Twist;
     use nalgebra::Vector6;
 
     use super::super::album::Album;

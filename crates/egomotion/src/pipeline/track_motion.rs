@@ -131,7 +131,11 @@ impl TrackMotion {
             self.memory.set_earlier(Earlier::only(here));
             return first;
         };
-        if earlier.iter().fold(false, |copies, before| here.forget_copies(before) || copies) {
+        let mut copies = false;
+        for before in earlier.iter() {
+            copies |= here.forget_copies(before);
+        }
+        if copies {
             let (reference, time_s) = (earlier.reference.moment(), here.time_s);
             // New tracks tell of a time that the old ones do not reach: the motion up to it is lost.
             self.memory.set_earlier(if here.points.is_empty() { earlier } else { Earlier::only(here) });

@@ -217,7 +217,8 @@ impl Iterate {
 
     /// Iterate until φ moves by less than the tolerance; with the sums of the last step.
     ///
-    /// The likelihood must not fall: a step by which it does is taken back and damped (Levenberg and Marquardt).
+    /// The likelihood must not fall, or the score must: a step after which neither holds is taken back and damped
+    /// (Levenberg and Marquardt).
     fn settle<M: LikelihoodTerm>(
         mut self,
         observations: &[M],
@@ -233,7 +234,10 @@ impl Iterate {
             let weighing = Weighing { blocks, residuals: self.residuals };
             let sums = FrameSums::linearised(observations, &mut structures, &at, &weighing);
             let cost = sums.whole.cost(self.residuals.scale2);
-            if let Some(best) = accepted.as_ref().filter(|best| best.falls_to(cost, sums.whole.used)) {
+            let left = sums.whole.way_left();
+            if let Some(best) =
+                accepted.as_ref().filter(|best| best.is_better_than(cost, left, sums.whole.used))
+            {
                 damping = (damping * DAMPING_GROWTH).clamp(LEAST_DAMPING, MOST_DAMPING);
                 self.phi = best.stepped(&direction(&best.sums.whole, false, damping)?);
                 structures.clone_from(&best.structures);
@@ -262,7 +266,7 @@ impl Iterate {
             if iteration > 0 && damping == 0.0 && rest <= kernel.tolerance * self.residuals.scale2.sqrt() {
                 return Ok((self, sums));
             }
-            accepted = Some(Accepted { phi: from, structures: structures.clone(), cost, sums });
+            accepted = Some(Accepted { phi: from, structures: structures.clone(), cost, left, sums });
         }
         // Expectation and maximisation come near the end slowly: what is left of the way is small beside φ's own error.
         let near = damping == 0.0 && last_moved <= LAST_STEP_SIGMAS * self.residuals.scale2.sqrt();
@@ -275,13 +279,19 @@ struct Accepted {
     phi: Twist,
     structures: Vec<Vector3<f64>>,
     cost: f64,
+    left: f64,
     sums: FrameSums,
 }
 
 impl Accepted {
-    /// Whether the likelihood falls from here to a place of this cost.
-    fn falls_to(&self, cost: f64, used: usize) -> bool {
-        cost.is_nan() || cost > self.cost + COST_SLACK * used as f64
+    /// Whether a step to a place of this cost, with so much way left, is to be taken back.
+    ///
+    /// The weights are those of the cost, but for the covariance of misclosures, which changes with φ a little: near the
+    /// end, where the score is zero, the cost may rise.
+    fn is_better_than(&self, cost: f64, left: f64, used: usize) -> bool {
+        let rises = cost > self.cost + COST_SLACK * used as f64;
+        let nearer = left < self.left && used >= self.sums.whole.used;
+        !cost.is_finite() || (rises && !nearer)
     }
 
     fn stepped(&self, delta: &Vector6<f64>) -> Twist {

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::maximum_likelihood::MaximumLikelihoodOptions;
 use super::mixture::{Mixture, ResidualModel};
-use super::score_sums::{FrameSums, Weighing, median_square, squares};
+use super::score_sums::{FrameSums, Weighing, median_square};
 use crate::constrain::{LinearisationPoint, Measurement};
 use crate::estimate::alignment::{Form, Moments, PointPair};
 use crate::estimate::certainty::observability::Observability;
@@ -16,7 +16,7 @@ use crate::estimate::random_subsets::{random_subsets, subsets_needed};
 use crate::estimate::student_t::LEAST_SCALE2;
 use crate::estimate::unsolvable::Unsolvable;
 use crate::geometry::distribution::{CHI2_3_P50, CHI2_3_P95};
-use crate::geometry::{StereoRig, Twist, median};
+use crate::geometry::{StereoRig, Twist};
 use crate::observe::StereoTrack;
 
 /// Subsets are drawn anew at most this often, while [`IMPLAUSIBLE_MEDIAN`] is exceeded.
@@ -122,7 +122,10 @@ fn concentrated(phi: &Twist, sample: &[StereoTrack], rig: &StereoRig) -> Twist {
     let mut phi = *phi;
     for _ in 0..CONCENTRATIONS {
         let at = LinearisationPoint::new(phi, rig);
-        let middle = median(&mut squares(sample, &at));
+        let middle = median_square(&phi, sample, rig);
+        if middle.is_infinite() {
+            break;
+        }
         let mut structures: Vec<Vector3<f64>> = sample.iter().map(Measurement::structure).collect();
         let residuals = ResidualModel {
             mixture: Mixture::within(CONCENTRATION_Q),

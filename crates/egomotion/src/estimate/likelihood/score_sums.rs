@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::mixture::ResidualModel;
 use crate::constrain::{LinearisationPoint, Measurement, Misclosure};
 use crate::estimate::certainty::blocks::{BlockScore, Blocks};
+use crate::estimate::certainty::observability::Observability;
 use crate::geometry::distribution::CHI2_3_P99;
 use crate::geometry::gaussian::{accumulate, product};
 use crate::geometry::{StereoRig, Twist, median};
@@ -73,6 +74,13 @@ impl ScoreSums {
     /// −2 ln of the likelihood at the linearisation, beside a constant, of misclosures of the given squared scale.
     pub(crate) fn cost(&self, scale2: f64) -> f64 {
         self.cost + 3.0 * self.used as f64 * scale2.ln()
+    }
+
+    /// Length of Gauss–Newton's step, in units of its own standard deviation; infinite where no step is determined.
+    pub(crate) fn way_left(&self) -> f64 {
+        let BlockScore { information, score } = &self.score;
+        let step = Observability::of(information).and_then(|found| found.solve(information, score));
+        step.map_or(f64::INFINITY, |step| step.dot(score).max(0.0).sqrt())
     }
 
     /// Factor from the inverse of Σ w Gᵀ S⁻¹ G to the covariance, where residuals are independent and spherical.
@@ -244,18 +252,22 @@ fn strip<M: Measurement>(
     runs
 }
 
-/// q = eᵀ S⁻¹ e of every observation in front of the camera, with the structure held at its measured value (the Sampson
-/// form).
-pub(crate) fn squares<M: Measurement>(observations: &[M], at: &LinearisationPoint<'_>) -> Vec<f64> {
-    let square = |o: &M| {
-        let l = o.linearise(&mut o.structure(), at)?;
-        Some(l.e.dot(&(l.inverse_cov * l.e)))
-    };
-    observations.iter().filter_map(square).collect()
+/// q = eᵀ S⁻¹ e of an observation, with the structure held at its measured value (the Sampson form); `None` behind the
+/// camera.
+fn square<M: Measurement>(observation: &M, at: &LinearisationPoint<'_>) -> Option<f64> {
+    let l = observation.linearise(&mut observation.structure(), at)?;
+    Some(l.e.dot(&(l.inverse_cov * l.e)))
 }
 
-/// The median of q at a motion; infinite without observations.
+/// q of every observation in front of the camera.
+pub(crate) fn squares<M: Measurement>(observations: &[M], at: &LinearisationPoint<'_>) -> Vec<f64> {
+    observations.iter().filter_map(|observation| square(observation, at)).collect()
+}
+
+/// The median of q at a motion; infinite without observations, and for each that the motion leads behind the camera.
 pub(crate) fn median_square<M: Measurement>(phi: &Twist, sample: &[M], rig: &StereoRig) -> f64 {
-    let middle = median(&mut squares(sample, &LinearisationPoint::new(*phi, rig)));
+    let at = LinearisationPoint::new(*phi, rig);
+    let square = |observation: &M| square(observation, &at).unwrap_or(f64::INFINITY);
+    let middle = median(&mut sample.iter().map(square).collect::<Vec<f64>>());
     if middle.is_nan() { f64::INFINITY } else { middle }
 }
