@@ -191,14 +191,14 @@ fn error_figures(name: &str, results: &RealResults<'_>) -> Vec<Figure> {
     let ahead = speed_axis(results, Quantity::Tz, ("against the speed ahead", "|tZ| (mm per frame)"));
     let turning = speed_axis(results, Quantity::Wy, ("against the turn", "|ΩY| (° per frame)"));
     let grouped = format!(
-        "A point is a group of at least {LEAST_FRAMES} frames of alike speed, at the median speed; means are over its frames. {INPUT}"
+        "A point is a group of at least {LEAST_FRAMES} frames of alike speed, at the median speed. {INPUT}"
     );
     let mut all = vec![Figure {
         id: "figure-12".to_owned(),
         title: format!("Figure 12. Error of VZ against speed: {name}"),
         caption: format!(
             "Every pixel where something was measured, against a still scene under the true φ; all frames, against the speed \
-             ahead and the turn. {} {grouped}",
+             ahead and the turn; means over the frames of a point. {} {grouped}",
             figures::VZ_CAPTION
         ),
         columns: 2,
@@ -219,7 +219,12 @@ fn error_figures(name: &str, results: &RealResults<'_>) -> Vec<Figure> {
             columns: 3,
             panels: figures::phi(results, axis, typical, |_| false, None),
         };
-        all.push(figure(id.to_owned(), title.to_owned(), "EAM", Typical::Mean));
+        all.push(figure(
+            id.to_owned(),
+            title.to_owned(),
+            "EAM, a mean over the frames of a point,",
+            Typical::Mean,
+        ));
         let medians =
             "Medians over the frames of a point of the absolute error, which single failures cannot ruin,";
         all.push(figure(format!("{id}-medians"), format!("{title}, medians"), medians, Typical::Median));

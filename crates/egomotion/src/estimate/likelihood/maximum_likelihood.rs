@@ -8,11 +8,12 @@
 //! residuals have them (the mixture of a t and outliers).
 
 use documented::DocumentedFields;
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::mixture::ResidualModel;
-use super::score_sums::{FrameSums, LikelihoodTerm, ScoreSums, Weighing, median_square, squares};
+use super::score_sums::{FrameSums, LikelihoodTerm, Weighing, median_square, squares};
+use super::step::{self, Accepted};
 use super::systematic::SystematicResponse;
 use crate::constrain::{LinearisationPoint, Measurement};
 use crate::estimate::certainty::blocks::{BlockScore, Blocks};
@@ -37,9 +38,6 @@ const RESIDUAL_FITS: usize = 2;
 /// Newton's steps are taken at most this often. Where they do not settle, Gauss–Newton's follow: each of them is one of
 /// expectation and maximisation, by which the likelihood does not fall.
 const NEWTON_STEPS: usize = 12;
-/// Newton's step is taken unless it is this many times as long as Gauss–Newton's: far from the end the likelihood may
-/// be flat in some direction, and Newton's step too long.
-const LONGEST_NEWTON_STEP: f64 = 3.0;
 /// The ratio of a step to the last is taken as at most this when the sum of those to come is foretold: a ratio near 1
 /// would foretell an endless way.
 const LARGEST_STEP_RATIO: f64 = 0.5;
@@ -47,15 +45,6 @@ const LARGEST_STEP_RATIO: f64 = 0.5;
 /// After the last iteration φ is good if it moved by no more than this share of its standard deviation: the gradient is
 /// then zero within its noise.
 const LAST_STEP_SIGMAS: f64 = 0.1;
-/// A step is taken back when the cost per observation rises by more than this: structures, which lag a step behind
-/// φ, change it by less.
-const COST_SLACK: f64 = 3e-3;
-/// The first damping after a step by which the likelihood fell, as a share of the information's diagonal.
-const LEAST_DAMPING: f64 = 0.1;
-/// Damping grows no further than this: steps are then a thousandth of Gauss–Newton's.
-const MOST_DAMPING: f64 = 1e3;
-/// Damping grows by this factor with each step that is taken back, and falls by it with each that is not.
-const DAMPING_GROWTH: f64 = 10.0;
 
 /// How maximum likelihood iterates and weighs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, DocumentedFields)]
@@ -238,26 +227,26 @@ impl Iterate {
             if let Some(best) =
                 accepted.as_ref().filter(|best| best.is_better_than(cost, left, sums.whole.used))
             {
-                damping = (damping * DAMPING_GROWTH).clamp(LEAST_DAMPING, MOST_DAMPING);
-                self.phi = best.stepped(&direction(&best.sums.whole, false, damping)?);
+                damping = step::more(damping);
+                self.phi = best.stepped(&step::direction(&best.sums.whole, false, damping)?);
                 structures.clone_from(&best.structures);
                 last_moved = 0.0;
                 continue;
             }
-            damping = if damping > LEAST_DAMPING { damping / DAMPING_GROWTH } else { 0.0 };
-            let step = &sums.whole;
-            if step.used < 3 {
-                return Err(Unsolvable::FewRows { rows: step.used, needed: 3 });
+            damping = step::less(damping);
+            let whole = &sums.whole;
+            if whole.used < 3 {
+                return Err(Unsolvable::FewRows { rows: whole.used, needed: 3 });
             }
-            let delta = direction(step, iteration < NEWTON_STEPS, damping)?;
+            let delta = step::direction(whole, iteration < NEWTON_STEPS, damping)?;
             let from = self.phi;
             self.phi = Twist::from_vector(&(from.vector() + delta));
             // Beside outliers a scale that follows the weights, which follow the scale, may shrink to nothing: it stays
             // as it was found (the MM-estimator of Yohai 1987).
             if kernel.nu.is_finite() && !self.residuals.mixture.has_outliers() {
-                self.residuals.scale2 = step.scale2().max(LEAST_SCALE2);
+                self.residuals.scale2 = whole.scale2().max(LEAST_SCALE2);
             }
-            let moved = delta.dot(&(step.score.information * delta)).max(0.0).sqrt();
+            let moved = delta.dot(&(whole.score.information * delta)).max(0.0).sqrt();
             // Steps that shrink by a factor are followed by ones that sum up to this.
             let factor = (moved / last_moved).min(LARGEST_STEP_RATIO);
             let rest = moved * factor / (1.0 - factor);
@@ -272,52 +261,6 @@ impl Iterate {
         let near = damping == 0.0 && last_moved <= LAST_STEP_SIGMAS * self.residuals.scale2.sqrt();
         accepted.filter(|_| near).map(|last| (self, last.sums)).ok_or(Unsolvable::NotConverged)
     }
-}
-
-/// The last φ from which the likelihood did not fall, with its sums.
-struct Accepted {
-    phi: Twist,
-    structures: Vec<Vector3<f64>>,
-    cost: f64,
-    left: f64,
-    sums: FrameSums,
-}
-
-impl Accepted {
-    /// Whether a step to a place of this cost, with so much way left, is to be taken back.
-    ///
-    /// The weights are those of the cost, but for the covariance of misclosures, which changes with φ a little: near the
-    /// end, where the score is zero, the cost may rise.
-    fn is_better_than(&self, cost: f64, left: f64, used: usize) -> bool {
-        let rises = cost > self.cost + COST_SLACK * used as f64;
-        let nearer = left < self.left && used >= self.sums.whole.used;
-        !cost.is_finite() || (rises && !nearer)
-    }
-
-    fn stepped(&self, delta: &Vector6<f64>) -> Twist {
-        Twist::from_vector(&(self.phi.vector() + delta))
-    }
-}
-
-/// The step of φ: Newton's, with the weights' own change, near the end; Gauss–Newton's elsewhere.
-///
-/// `damping` adds that share of its own diagonal to the information.
-fn direction(step: &ScoreSums, newton: bool, damping: f64) -> Result<Vector6<f64>, Unsolvable> {
-    let (information, score) = (&step.score.information, &step.score.score);
-    if damping > 0.0 {
-        let damped = information + Matrix6::from_diagonal(&(information.diagonal() * damping));
-        return Observability::of(&damped)?.solve(&damped, score);
-    }
-    let observability = Observability::of(information)?;
-    let plain = observability.solve(information, score)?;
-    if observability.rank() < 6 || !newton {
-        return Ok(plain);
-    }
-    let newton = step.bread().cholesky().map(|bread| bread.solve(score));
-    let length = |v: &Vector6<f64>| v.dot(&(information * v));
-    Ok(newton
-        .filter(|newton| length(newton) <= LONGEST_NEWTON_STEP.powi(2) * length(&plain))
-        .unwrap_or(plain))
 }
 
 /// The answer from the sums of the last step, which was less than the tolerance.

@@ -5,4 +5,5 @@ pub(super) mod maximum_likelihood;
 pub(super) mod mixture;
 pub(super) mod robust_start;
 pub(super) mod score_sums;
+mod step;
 pub(super) mod systematic;
