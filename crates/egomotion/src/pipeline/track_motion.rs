@@ -19,8 +19,6 @@ use crate::observe::StereoTrack;
 
 /// Standard deviation of a tracked place until the residuals tell a better one, in pixels.
 const PLACE_SIGMA_PX: f64 = 0.5;
-/// Fewest tracks whose residuals tell their distribution; of fewer, Student's t is taken as it stands.
-const FEWEST_FITTED: usize = 200;
 
 /// A point of a track: where one frame's two images show it, in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -172,9 +170,7 @@ impl TrackMotion {
             .collect();
         let mut rows: Vec<f64> = pairs.iter().map(|(a, _)| a.right.1 - a.left.1).collect();
         let rows = Some(median(&mut rows).abs()).filter(|rows| rows.is_finite());
-        let mut config = self.config.clone();
-        config.maximum_likelihood.kernel.fitted &= tracks.len() >= FEWEST_FITTED;
-        let interval = Interval::new(&self.rig, &config, TrackSource::Stereo, dt_s);
+        let interval = Interval::new(&self.rig, &self.config, TrackSource::Stereo, dt_s);
         let start = first_motion(&tracks, &interval, expected.as_ref());
         let observed = Observed::Tracks(&tracks);
         let motion = timed(&mut stages.estimate_ms, || solve(&observed, &interval, Some(&start?)));
