@@ -27,9 +27,6 @@ use crate::geometry::{Gaussian, StereoRig, Twist};
 /// An answer is not believed whose median of q is this many times that of the robust start: a mixture fitted to few
 /// observations may see some that happen to agree, and call the others outliers.
 const ASTRAY_MEDIAN_RATIO: f64 = 1.5;
-/// Fewest observations whose residuals tell their distribution; of fewer, Student's t is taken as it stands. A mixture
-/// fitted to a half of KITTI 05's corners, 79 tracks, took the 35 that agreed best for all inliers, 10 σ off.
-const FEWEST_FITTED: usize = 200;
 /// About this many observations bring the iteration near its end before all of them are used: fewer are cheaper, and
 /// leave more to the steps over all.
 const COARSE_OBSERVATIONS: usize = 4096;
@@ -135,7 +132,6 @@ pub fn maximum_likelihood<M: LikelihoodTerm>(
 ) -> Result<MaximumLikelihood, Unsolvable> {
     let stride = (observations.len() / COARSE_OBSERVATIONS).max(1);
     let few: Vec<M> = observations.iter().step_by(stride).copied().collect();
-    let kernel = &StudentT { fitted: kernel.fitted && observations.len() >= FEWEST_FITTED, ..*kernel };
     let found = maximise(observations, &few, rig, start, blocks, kernel);
     if !(kernel.nu.is_finite() && kernel.fitted) {
         return found;

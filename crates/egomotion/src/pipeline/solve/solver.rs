@@ -5,7 +5,7 @@ use crate::constrain::{LinearConstraint, LinearisationPoint, binocular_flow, dcc
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
 use crate::estimate::{
     Blocks, LikelihoodTerm, LinearFit, LmedsOptions, MaximumLikelihood, MotionEstimate, Row, SensedTrack,
-    SensorErrors, SensorPrior, Tolerance, TrackSource, Unsolvable, Weighting, augmented_step,
+    SensorErrors, SensorPrior, StudentT, Tolerance, TrackSource, Unsolvable, Weighting, augmented_step,
     errors_in_variables, least_squares, lmeds, m_estimate, maximum_likelihood, two_step,
 };
 use crate::geometry::{CayleyMotion, StereoRig, Twist};
@@ -17,6 +17,10 @@ use nalgebra::{Matrix6, SVector};
 const SENSOR_ROUNDS: usize = 5;
 /// Rounds end when φ moves by less than this, in its standard deviations: what is left is small beside its own error.
 pub(super) const SETTLED_SIGMAS: f64 = 0.1;
+/// Fewest observations whose residuals tell their distribution; of fewer, Student's t is taken as it stands, from a start
+/// that no moving body has captured. A mixture fitted to a half of KITTI 05's corners, 79 tracks, took the 35 that agreed
+/// best for all inliers, 10 σ off.
+const FEWEST_FITTED: usize = 200;
 
 /// The methods on observations at hand, each with the configured estimator.
 #[derive(Debug, Clone, Copy)]
@@ -62,12 +66,17 @@ impl<'a> Solver<'a> {
     /// # Errors
     /// [`Unsolvable`] when the observations do not determine a motion.
     pub fn likelihood<M: LikelihoodTerm>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
-        let options = &self.config.maximum_likelihood;
-        let blocks = Some(&self.blocks);
-        let found = maximum_likelihood(observations, self.rig, self.start, blocks, &options.kernel)?;
+        let kernel = &self.kernel(observations.len());
+        let found = maximum_likelihood(observations, self.rig, self.start, Some(&self.blocks), kernel)?;
         let mut motion = found.motion;
         motion.theta.cov += self.phase_covariance(&found);
         Ok(motion)
+    }
+
+    /// How so many observations are weighed.
+    fn kernel(&self, observations: usize) -> StudentT {
+        let kernel = self.config.maximum_likelihood.kernel;
+        StudentT { fitted: kernel.fitted && observations >= FEWEST_FITTED, ..kernel }
     }
 
     /// What the phase error adds to a covariance.
@@ -110,7 +119,7 @@ impl<'a> Solver<'a> {
         errors: &mut SensorErrors,
     ) -> Result<MotionEstimate, Unsolvable> {
         let tracks: Vec<StereoTrack> = corrected.iter().map(|sensed| sensed.track).collect();
-        let kernel = &self.config.maximum_likelihood.kernel;
+        let kernel = &self.kernel(tracks.len());
         let blocks = &self.blocks;
         let found = maximum_likelihood(&tracks, self.rig, self.start, Some(blocks), kernel)?;
         let (phase, mut motion) = (self.phase_covariance(&found), found.motion);
