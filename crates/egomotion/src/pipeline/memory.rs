@@ -24,7 +24,7 @@ pub trait TimedFrame {
 pub(super) struct Earlier<F> {
     /// The last frame that took part in an answer, or the first of all.
     pub(super) reference: F,
-    /// The newest frame, once several in a row were in vain matched with the reference.
+    /// The newest frame, after several in a row gave no answer with the reference.
     pub(super) newest: Option<F>,
 }
 
@@ -164,7 +164,8 @@ impl<F: TimedFrame> Memory<F> {
 
     /// Keep what the next frame needs of an answer, and return a frame that is not needed again.
     ///
-    /// After a failure the reference stays, however many fail: a robot that sees nothing for a while finds itself again.
+    /// After a failure the reference stays, however many frames fail: a robot that saw nothing for a while is then matched
+    /// with what it saw before.
     pub(super) fn remember(&mut self, answer: &FrameMotion, earlier: Earlier<F>, here: F) -> Option<F> {
         self.frames += 1;
         self.failures = if answer.motion.is_ok() { 0 } else { self.failures + 1 };

@@ -206,8 +206,7 @@ impl Iterate {
 
     /// Iterate until φ moves by less than the tolerance; with the sums of the last step.
     ///
-    /// The likelihood must not fall, or the score must: a step after which neither holds is taken back and damped
-    /// (Levenberg and Marquardt).
+    /// A step is taken back and damped (Levenberg and Marquardt) where the likelihood falls and the score does not.
     fn settle<M: LikelihoodTerm>(
         mut self,
         observations: &[M],
@@ -223,10 +222,7 @@ impl Iterate {
             let weighing = Weighing { blocks, residuals: self.residuals };
             let sums = FrameSums::linearised(observations, &mut structures, &at, &weighing);
             let cost = sums.whole.cost(self.residuals.scale2);
-            let left = sums.whole.way_left();
-            if let Some(best) =
-                accepted.as_ref().filter(|best| best.is_better_than(cost, left, sums.whole.used))
-            {
+            if let Some(best) = accepted.as_ref().filter(|best| best.is_better_than(cost, &sums.whole)) {
                 damping = step::more(damping);
                 self.phi = best.stepped(&step::direction(&best.sums.whole, false, damping)?);
                 structures.clone_from(&best.structures);
@@ -255,7 +251,7 @@ impl Iterate {
             if iteration > 0 && damping == 0.0 && rest <= kernel.tolerance * self.residuals.scale2.sqrt() {
                 return Ok((self, sums));
             }
-            accepted = Some(Accepted { phi: from, structures: structures.clone(), cost, left, sums });
+            accepted = Some(Accepted { phi: from, structures: structures.clone(), cost, sums });
         }
         // Expectation and maximisation come near the end slowly: what is left of the way is small beside φ's own error.
         let near = damping == 0.0 && last_moved <= LAST_STEP_SIGMAS * self.residuals.scale2.sqrt();

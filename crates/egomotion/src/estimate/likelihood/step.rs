@@ -30,27 +30,27 @@ pub(super) fn less(damping: f64) -> f64 {
     if damping > LEAST_DAMPING { damping / DAMPING_GROWTH } else { 0.0 }
 }
 
-/// The last φ from which the likelihood did not fall, with its sums.
+/// The φ of the last step that was not taken back, with its sums.
 pub(super) struct Accepted {
     pub(super) phi: Twist,
     pub(super) structures: Vec<Vector3<f64>>,
     pub(super) cost: f64,
-    /// Length of the step from here, in its standard deviations.
-    pub(super) left: f64,
     pub(super) sums: FrameSums,
 }
 
 impl Accepted {
-    /// Whether a step to a place of this cost, with so much way left, is to be taken back.
+    /// Whether a step from here to a place of this cost and these sums is to be taken back.
     ///
-    /// The weights are those of the cost, but for the covariance of misclosures, which changes with φ a little: near the
-    /// end, where the score is zero, the cost may rise.
-    pub(super) fn is_better_than(&self, cost: f64, left: f64, used: usize) -> bool {
-        let rises = cost > self.cost + COST_SLACK * used as f64;
-        let nearer = left < self.left && used >= self.sums.whole.used;
-        !cost.is_finite() || (rises && !nearer)
+    /// The score takes the covariance of misclosures as constant, but it changes a little with φ. So the cost may rise near
+    /// the end, although the score comes nearer to zero there.
+    pub(super) fn is_better_than(&self, cost: f64, there: &ScoreSums) -> bool {
+        let here = &self.sums.whole;
+        let rises = cost > self.cost + COST_SLACK * there.used as f64;
+        let nearer = || there.used >= here.used && there.way_left() < here.way_left();
+        !cost.is_finite() || (rises && !nearer())
     }
 
+    /// The motion that a step from here leads to.
     pub(super) fn stepped(&self, delta: &Vector6<f64>) -> Twist {
         Twist::from_vector(&(self.phi.vector() + delta))
     }
