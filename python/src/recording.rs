@@ -54,16 +54,7 @@ pub fn run(
     threads: Option<usize>,
     settings: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Run> {
-    let sensor = match sensor {
-        None => None,
-        Some("stereo") => Some(Sensor::Stereo),
-        Some("depth") => Some(Sensor::Depth),
-        Some(other) => {
-            return Err(PyValueError::new_err(format!(
-                "sensor {other:?} is not known; give 'stereo' or 'depth'"
-            )));
-        }
-    };
+    let sensor = sensor.map(named_sensor).transpose()?;
     if stride == 0 {
         return Err(PyValueError::new_err("stride is 0; give at least 1"));
     }
@@ -99,6 +90,17 @@ pub fn run(
         threads,
         doubt: Doubt::default(),
     })
+}
+
+/// The sensor of that name.
+fn named_sensor(name: &str) -> PyResult<Sensor> {
+    match name {
+        "stereo" => Ok(Sensor::Stereo),
+        "depth" => Ok(Sensor::Depth),
+        other => {
+            Err(PyValueError::new_err(format!("sensor {other:?} is not known; give 'stereo' or 'depth'")))
+        }
+    }
 }
 
 /// A path; a dictionary goes to the settings of that name.
