@@ -2,6 +2,7 @@
 
 import json
 import threading
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -131,6 +132,19 @@ def test_own_flow_takes_the_place_of_ours() -> None:
             own.push(*FRAMES[2], 0.2, **wrong)
     # Nothing of these calls has passed for a frame.
     assert own.push(*FRAMES[2], 0.2).frame == 2
+
+
+def test_a_method_that_does_not_hold_is_warned_of_once() -> None:
+    drive = em.Sequence("drive", frames=2, step=16.0)
+    pair = [drive.render(k, samples=2) for k in range(2)]
+    motion = em.StereoMotion(drive.rig, method="dv", approach="differential")
+    motion.push(*pair[0], 0.0)
+    with pytest.warns(UserWarning, match="frame 1: .* tracked corners .* too fast"):
+        answer = motion.push(*pair[1], 1.0)
+    assert answer.status == "ok" and answer.contradiction is not None
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert motion.push(*pair[0], 2.0).contradiction is not None
 
 
 def test_the_nearest_obstacle_has_a_time_and_a_place() -> None:

@@ -5,7 +5,10 @@ use egomotion::geometry::{Gaussian, Grid, Image, Twist};
 use egomotion::metrics::Nees;
 use egomotion::motion::NoObstacle;
 use egomotion::pipeline::StageTimes;
-use egomotion::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion, Trajectory, Unanswered};
+use egomotion::pipeline::solve::BiasCause;
+use egomotion::pipeline::{
+    Approach, Config, FrameMotion, Method, Observe, StereoFrame, StereoMotion, Trajectory, Unanswered,
+};
 use egomotion::sim::{SensorNoise, Sequence};
 use nalgebra::{Matrix6, Vector6};
 
@@ -306,4 +309,24 @@ fn poses_between_are_interpolated_in_time() {
         assert!((got.rotation - want.rotation).norm() < 1e-12, "{k}");
     }
     assert_eq!(trajectory.times_s().len(), 6);
+}
+
+/// Where the motion is small no method is contradicted; at sixteen times of it those that linearise are, and the cause is
+/// the one that the motion has.
+#[test]
+fn corners_contradict_a_method_that_cannot_hold() {
+    let cause = |method: Method, step: f64| {
+        let sequence = Sequence::named("drive", Some((320, 240)), Some(2), step).unwrap();
+        let config = Config { method, approach: Approach::Differential, ..Config::default() };
+        let mut motion = StereoMotion::new(sequence.rig, config).unwrap();
+        motion.push(frame(&sequence, 0));
+        let answer = motion.push(frame(&sequence, 1));
+        assert!(answer.motion.is_ok(), "{method:?} {step}");
+        answer.contradiction.map(|contradiction| contradiction.cause)
+    };
+    assert_eq!([cause(Method::Dcce, 1.0), cause(Method::Dv, 1.0)], [None, None]);
+    let far = cause(Method::Dcce, 16.0);
+    assert!(matches!(far, Some(BiasCause::LongDisplacement { pixels }) if pixels > 20.0), "{far:?}");
+    let fast = cause(Method::Dv, 16.0);
+    assert!(matches!(fast, Some(BiasCause::FastApproach { share }) if share > 0.1), "{fast:?}");
 }
