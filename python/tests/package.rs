@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::thread;
 
 /// What the tests need besides the wheel's own dependencies.
 const NEEDED: [&str; 15] = [
@@ -37,7 +38,11 @@ fn the_wheel_passes_its_tests() {
     }
     let bin = environment.join(if cfg!(windows) { "Scripts" } else { "bin" });
     let own = bin.join("python");
-    let installed = Command::new(&own).args(["-m", "pip", "install", "-q"]).args(NEEDED).output().unwrap();
+    let installed = Command::new(&own)
+        .args(["-m", "pip", "install", "-q", "--no-compile"])
+        .args(NEEDED)
+        .output()
+        .unwrap();
     if !installed.status.success() {
         println!("SKIPPED for want of Python packages: {}", last_line(&installed));
         return;
@@ -55,24 +60,24 @@ fn the_wheel_passes_its_tests() {
     passes(&own, |command| {
         command.args(["-m", "pip", "install", "-q"]).arg(&wheel);
     });
-    // From a folder of its own, so that nothing but the wheel can be imported.
-    let tests = here.join("tests");
-    passes(&own, |command| {
-        if let Some(built) = command_of_the_workspace() {
-            command.env("EGOMOTION_COMMAND", built);
-        }
-        command.args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]).arg(&tests).current_dir(folder.path());
+    // From a folder of its own, so that nothing but the wheel can be imported. Ray's tests mostly wait.
+    let python = |arguments: &[&str]| {
+        passes(&own, |command| {
+            if let Some(built) = command_of_the_workspace() {
+                command.env("EGOMOTION_COMMAND", built);
+            }
+            command.arg("-m").args(arguments).current_dir(folder.path());
+        });
+    };
+    let place = |name: &str| here.join(name).to_str().unwrap().to_owned();
+    let (tests, ray, settings) = (place("tests"), place("tests/test_ray.py"), place("pyproject.toml"));
+    let pytest = ["pytest", "-q", "-p", "no:cacheprovider"];
+    thread::scope(|scope| {
+        scope.spawn(|| python(&[&pytest[..], &[&ray]].concat()));
+        scope.spawn(|| python(&[&pytest[..], &["--ignore", &ray, &tests]].concat()));
     });
-    passes(&own, |command| {
-        command
-            .args(["-m", "mypy", "--config-file"])
-            .arg(here.join("pyproject.toml"))
-            .arg(&tests)
-            .current_dir(folder.path());
-    });
-    passes(&own, |command| {
-        command.args(["-m", "mypy.stubtest", "egomotion._native"]).current_dir(folder.path());
-    });
+    python(&["mypy", "--config-file", &settings, &tests]);
+    python(&["mypy.stubtest", "egomotion._native"]);
 }
 
 /// The command `egomotion`, which the tests of the whole workspace build; its answers are compared.

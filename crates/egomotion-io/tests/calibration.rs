@@ -1,6 +1,4 @@
 //! Calibration files: each format comes back as written, is recognised by its content, and names what is wrong.
-#![allow(missing_docs)]
-
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,4 @@
 //! The readers on real datasets, against what their documentation says.
-#![allow(missing_docs)]
-
 use std::io::Write;
 use std::path::PathBuf;
 

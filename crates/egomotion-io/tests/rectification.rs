@@ -1,6 +1,4 @@
 //! Rectification against OpenCV's, for every kind of lens; `fixtures/rectification.py` made the numbers.
-#![allow(missing_docs)]
-
 use std::path::{Path, PathBuf};
 
 use egomotion::geometry::StereoRectification;

@@ -1,6 +1,4 @@
 //! Recognition of folders, and what is said about those that are incomplete or wrong.
-#![allow(missing_docs)]
-
 use std::fs;
 use std::path::Path;
 

@@ -3,8 +3,6 @@
 //! Two runs see disjoint checkerboards of the image, so that their errors are independent but for what all matches
 //! share, which cancels: the squared difference of the two motions, in units of their summed covariance, is one for
 //! each degree of freedom.
-#![allow(missing_docs)]
-
 use std::io::Write;
 use std::path::PathBuf;
 

@@ -4,8 +4,7 @@
 //! errors √(2/degrees) of the mean. A covariance that is itself estimated from B blocks makes it Hotelling's T²
 //! instead of χ²: its mean is at most (B − 1)/(B − 2 − p), which widens the upper bound (and the standard error).
 
-mod scattered;
-
+use crate::scattered::{self, correlated, normals, phi, places, random, rig, stereo_flow};
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
 use egomotion::estimate::alignment::{Fitting, Form, PointPair, align};
 use egomotion::estimate::{
@@ -21,7 +20,6 @@ use egomotion::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
-use scattered::{correlated, normals, phi, places, random, rig, stereo_flow};
 
 const GAUSSIAN: StudentT = StudentT { nu: f64::INFINITY, fitted: false, iterations: 100, tolerance: 1e-6 };
 

@@ -1,7 +1,6 @@
 //! Every analytic Jacobian, and every covariance that rests on one, against central differences.
 
-mod scattered;
-
+use crate::scattered::{self, correlated, normals, phi, places, random, rig, stereo_flow};
 use egomotion::constrain::{LinearConstraint, binocular_flow, dcce, displacement, image_flow};
 use egomotion::estimate::{
     LikelihoodTerm, Row, StudentT, Weighting, least_squares, m_estimate, maximum_likelihood,
@@ -14,7 +13,6 @@ use egomotion::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoT
 use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector4, Vector6};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
-use scattered::{correlated, normals, phi, places, random, rig, stereo_flow};
 
 /// Derivatives of `f` by central differences over two step sizes, exact to the fourth order.
 fn numeric<const M: usize, const N: usize>(

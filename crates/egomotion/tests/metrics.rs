@@ -1,6 +1,4 @@
 //! The metrics against an independent program, and on cases whose answer is known.
-#![allow(missing_docs)]
-
 use approx::assert_relative_eq;
 use egomotion::geometry::{Gaussian, RigidMotion};
 use egomotion::metrics::{

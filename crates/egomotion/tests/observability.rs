@@ -1,7 +1,6 @@
 //! What cannot be observed is said in words: the motions that geometry hides, and no others.
 
-mod scattered;
-
+use crate::scattered::{self, normals, phi, places, plane, random, rig, stereo_flow, track};
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
 use egomotion::estimate::{
     Blocks, MotionEstimate, Row, StudentT, Unsolvable, Weighting, errors_in_variables, least_squares,
@@ -10,7 +9,6 @@ use egomotion::estimate::{
 use egomotion::geometry::{Gaussian, StereoRig, Twist};
 use egomotion::observe::{DepthChange, DepthFlow};
 use nalgebra::{Matrix3, Vector3};
-use scattered::{normals, phi, places, plane, random, rig, stereo_flow, track};
 
 type Seen = Vec<(Vector3<f64>, [f64; 2])>;
 

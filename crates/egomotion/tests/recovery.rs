@@ -1,8 +1,7 @@
 //! Every estimator finds the exact answer of exact observations, says what cannot be observed, and
 //! withstands what does not belong.
 
-mod scattered;
-
+use crate::scattered::{self, normals, phi, places, plane, random, rig, stereo_flow, track};
 use egomotion::constrain::{binocular_flow, dcce, image_flow};
 use egomotion::estimate::alignment::{Fitting, Form, PointPair, align};
 use egomotion::estimate::{
@@ -17,7 +16,6 @@ use egomotion::pipeline::solve::Solver;
 use nalgebra::{Matrix3, SVector, Vector3, Vector6};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
-use scattered::{normals, phi, places, plane, random, rig, stereo_flow, track};
 
 const EXACT: f64 = 1e-9;
 

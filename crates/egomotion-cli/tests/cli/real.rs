@@ -1,6 +1,4 @@
 //! The command on real recordings, judged by their own truth.
-#![allow(missing_docs)]
-
 use std::io::Write;
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,4 @@
 //! `report.html` in a real browser: every place of the slider, without an error and without the network.
-#![allow(missing_docs)]
-
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
