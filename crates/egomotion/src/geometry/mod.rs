@@ -13,6 +13,7 @@ mod perspective;
 mod rectification;
 mod regions;
 mod rig;
+mod rig_errors;
 mod twist;
 
 pub use camera::{Camera, CameraError};
@@ -26,4 +27,5 @@ pub use rectification::{RectificationError, StereoRectification};
 pub(crate) use regions::Cells;
 pub use regions::PixelBounds;
 pub use rig::{RigCamera, RigError, StereoRig};
+pub use rig_errors::{RIG_ERRORS, RigErrors};
 pub use twist::{RigidMotion, Twist};

@@ -139,6 +139,15 @@ impl RigidMotion {
         Self { rotation: back, translation: -(back * self.translation) }
     }
 
+    /// Ad of this motion, 6×6: exp(Ad δ) after this motion is this motion after exp(δ).
+    pub fn adjoint(&self) -> Matrix6<f64> {
+        let mut adjoint = Matrix6::zeros();
+        adjoint.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.rotation);
+        adjoint.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.rotation);
+        adjoint.fixed_view_mut::<3, 3>(0, 3).copy_from(&(self.translation.cross_matrix() * self.rotation));
+        adjoint
+    }
+
     /// The rotation as a unit quaternion.
     pub fn quaternion(&self) -> UnitQuaternion<f64> {
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(self.rotation))
@@ -222,6 +231,15 @@ mod tests {
                 assert!((delta - jacobian.column(k)).norm() < 1e-8, "{phi:?} {k}");
             }
         }
+    }
+
+    #[test]
+    fn the_adjoint_carries_a_small_motion_across() {
+        let (motion, delta) = (twists()[6].exp(), twists()[4]);
+        let across = Twist::from_vector(&(motion.adjoint() * delta.vector()));
+        let (left, right) = (across.exp().after(&motion), motion.after(&delta.exp()));
+        assert!((left.translation - right.translation).norm() < 1e-12);
+        assert!((left.rotation - right.rotation).norm() < 1e-12);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::scene::{Hit, Scene};
-use crate::geometry::{Grid, Image, RigidMotion, StereoRig};
+use crate::geometry::{Grid, Image, RigErrors, RigidMotion, StereoRig};
 
 /// Surface id of a pixel that sees nothing.
 pub(super) const NOTHING: u16 = u16::MAX;
@@ -18,6 +18,8 @@ pub struct View<'a> {
     pub rig: &'a StereoRig,
     /// Pose of the cyclopean camera.
     pub world_from_cyclopean: RigidMotion,
+    /// By how much what takes the images differs from `rig`.
+    pub rig_errors: RigErrors,
 }
 
 /// A stereo pair of grey levels 0 … 255, not rounded.
@@ -45,7 +47,15 @@ pub(super) struct Eye {
 impl<'a> View<'a> {
     /// The scene from a pose of the cyclopean camera.
     pub fn new(scene: &'a Scene, rig: &'a StereoRig, world_from_cyclopean: RigidMotion) -> Self {
-        Self { scene, rig, world_from_cyclopean }
+        Self { scene, rig, world_from_cyclopean, rig_errors: RigErrors::default() }
+    }
+
+    /// The same, taken by a rig that differs from the stated one.
+    ///
+    /// The left camera stays where it is. Truth is that of the stated rig.
+    #[must_use]
+    pub fn with_rig_errors(self, rig_errors: RigErrors) -> Self {
+        Self { rig_errors, ..self }
     }
 
     /// Both images, with `samples` × `samples` rays through every pixel at an edge between surfaces.
@@ -53,11 +63,11 @@ impl<'a> View<'a> {
     /// Inside a surface the texture is averaged over the pixel's footprint in closed form, so one ray is
     /// enough there. Rows are rendered in parallel; the result does not depend on the number of threads.
     pub fn render(&self, samples: usize) -> StereoImages {
-        let (left, right) = self.eyes();
+        let (left, right) = self.real_eyes();
         StereoImages { left: self.image(&left, samples), right: self.image(&right, samples) }
     }
 
-    /// Left and right camera in the world.
+    /// Left and right camera in the world, as they are stated.
     pub(super) fn eyes(&self) -> (Eye, Eye) {
         let left = self.rig.left_from_cyclopean();
         let eye = |centre: Vector3<f64>, cx_px: f64| Eye {
@@ -69,6 +79,29 @@ impl<'a> View<'a> {
             focal_px: self.rig.focal_px,
         };
         (eye(left, self.rig.cx_px), eye(-left, self.rig.cx_px + self.rig.doffs_px))
+    }
+
+    /// Left and right camera in the world, as they are.
+    fn real_eyes(&self) -> (Eye, Eye) {
+        let (left, right) = self.eyes();
+        let errors = &self.rig_errors;
+        if errors.is_none() {
+            return (left, right);
+        }
+        let real = |eye: Eye| Eye {
+            cx_px: eye.cx_px + errors.centre_x_px,
+            cy_px: eye.cy_px + errors.centre_y_px,
+            focal_px: eye.focal_px * (1.0 + errors.focal),
+            ..eye
+        };
+        let (left, right) = (real(left), real(right));
+        let right = Eye {
+            origin: left.origin + (right.origin - left.origin) * (1.0 + errors.baseline),
+            world_from_camera: right.world_from_camera * errors.right_from_stated().transpose(),
+            focal_px: right.focal_px * (1.0 + errors.focal_ratio),
+            ..right
+        };
+        (left, right)
     }
 
     fn image(&self, eye: &Eye, samples: usize) -> Image {

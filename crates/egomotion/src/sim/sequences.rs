@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::render::View;
 use super::scene::{Scene, least};
-use crate::geometry::{RigidMotion, StereoRig, Twist};
+use crate::geometry::{RigErrors, RigidMotion, StereoRig, Twist};
 
 /// Constant motions of section 7.1 and ours: name, then (tX, tY, tZ) in mm and Ω in degrees per frame,
 /// as scene motion of the cyclopean camera.
@@ -39,6 +39,8 @@ const DEFAULT_FRAMES: usize = 10;
 const DEMO_FRAMES: usize = 24;
 /// Time between two frames of the demonstration, in seconds.
 const DEMO_INTERVAL_S: f64 = 0.1;
+/// Frames of the corridor: to its end, past two turns each way.
+const CORRIDOR_FRAMES: usize = 64;
 
 /// A sequence of exact poses in a scene. Motions are scene motions φ of the cyclopean camera.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,6 +51,8 @@ pub struct Sequence {
     pub scene: Scene,
     /// What sees it.
     pub rig: StereoRig,
+    /// By how much the rig that takes the images differs from `rig`.
+    pub rig_errors: RigErrors,
     /// Time between two frames, in seconds; 1 where the motion is defined per frame only.
     pub interval_s: f64,
     motions: Vec<Twist>,
@@ -58,7 +62,7 @@ pub struct Sequence {
 impl Sequence {
     /// Every name that [`Sequence::named`] knows.
     pub fn names() -> impl Iterator<Item = &'static str> {
-        CONSTANT_MOTIONS.iter().map(|(name, _)| *name).chain(["demo"]).chain(Self::lab_names())
+        CONSTANT_MOTIONS.iter().map(|(name, _)| *name).chain(["demo", "corridor"]).chain(Self::lab_names())
     }
 
     /// The names of the manipulator's sequences, in the paper's order.
@@ -69,8 +73,8 @@ impl Sequence {
     /// The sequence of that name (any case); `None` if there is none.
     ///
     /// `size_px`, the image's (width, height), scales the focal length with the width; `None` is the
-    /// sequence's own size, 320×240 for the paper's and 640×480 for `demo`. `frames` `None` is the
-    /// sequence's own number; `demo` has at most 24. `step` multiplies every motion. A long or fast drive
+    /// sequence's own size, 320×240 for the paper's and 640×480 for `demo` and `corridor`. `frames` `None` is the
+    /// sequence's own number; `demo` has at most 24, `corridor` at most 64. `step` multiplies every motion. A long or fast drive
     /// leaves the room: [`Sequence::clearance_m`] tells.
     pub fn named(
         name: &str,
@@ -83,6 +87,12 @@ impl Sequence {
             let motions = (1..frames).map(|k| demo_motion(k as f64 - 0.5).scaled(step)).collect();
             let rig = rig(500.0 / 640.0, 0.16, size_px.unwrap_or((640, 480)))?;
             return Some(Self::new("demo", Scene::demo_room(), rig, DEMO_INTERVAL_S, motions));
+        }
+        if name.eq_ignore_ascii_case("corridor") {
+            let frames = frames.unwrap_or(CORRIDOR_FRAMES).min(CORRIDOR_FRAMES);
+            let motions = (1..frames).map(|k| corridor_motion(k as f64 - 0.5).scaled(step)).collect();
+            let rig = rig(500.0 / 640.0, 0.16, size_px.unwrap_or((640, 480)))?;
+            return Some(Self::new("corridor", Scene::corridor(), rig, DEMO_INTERVAL_S, motions));
         }
         let known = |list: &[(&'static str, [f64; 6])]| {
             list.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).copied()
@@ -103,7 +113,8 @@ impl Sequence {
             pose = pose.after(&phi.exp().inverse());
             world_from_cyclopean.push(pose);
         }
-        Self { name: name.to_owned(), scene, rig, interval_s, motions, world_from_cyclopean }
+        let rig_errors = RigErrors::default();
+        Self { name: name.to_owned(), scene, rig, rig_errors, interval_s, motions, world_from_cyclopean }
     }
 
     /// Number of frames, at least 1.
@@ -113,7 +124,8 @@ impl Sequence {
 
     /// What the rig sees at frame `k`; `None` past the end.
     pub fn view(&self, k: usize) -> Option<View<'_>> {
-        Some(View::new(&self.scene, &self.rig, *self.world_from_cyclopean.get(k)?))
+        let view = View::new(&self.scene, &self.rig, *self.world_from_cyclopean.get(k)?);
+        Some(view.with_rig_errors(self.rig_errors))
     }
 
     /// Pose of the left camera at frame `k`; `None` past the end.
@@ -137,6 +149,12 @@ impl Sequence {
     pub fn clearance_m(&self, k: usize) -> Option<f64> {
         let (left, right) = self.view(k)?.eyes();
         Some(least(self.scene.clearance_m(&left.origin), self.scene.clearance_m(&right.origin)))
+    }
+
+    /// The same sequence, its images taken by a rig that differs from the stated one.
+    #[must_use]
+    pub fn with_rig_errors(self, rig_errors: RigErrors) -> Self {
+        Self { rig_errors, ..self }
     }
 
     /// The same sequence, its surfaces under the texture of another seed.
@@ -176,6 +194,21 @@ fn demo_motion(k: f64) -> Twist {
     let swerve = (std::f64::consts::TAU * k / (DEMO_FRAMES as f64 - 1.0)).sin();
     let (nod, sway) = (0.12 * (1.7 * k).sin(), 0.10 * (1.1 * k + 0.6).sin());
     twist_from_mm_deg(&[-1.5 * swerve, 0.8 * (1.7 * k).cos(), -pace_mm, nod, 0.85 * swerve, sway])
+}
+
+/// Scene motion of the corridor at time `k`, in frames: a walking pace that winds between the pillars, to the right and to
+/// the left twice, with a nod.
+fn corridor_motion(k: f64) -> Twist {
+    let phase = std::f64::consts::TAU * k / (0.5 * (CORRIDOR_FRAMES as f64 - 1.0));
+    let (turn, nod) = (phase.cos(), 0.10 * (1.3 * k).sin());
+    twist_from_mm_deg(&[
+        2.0 * turn,
+        1.5 * (1.3 * k).cos(),
+        -130.0 - 20.0 * (0.21 * k).sin(),
+        nod,
+        -2.2 * turn,
+        0.5 * nod,
+    ])
 }
 
 #[cfg(test)]
