@@ -19,16 +19,16 @@ const CELL_PX: usize = 64;
 /// φ of every pair, seen through the squares of one colour.
 fn motions(sequence: &Sequence, colour: usize) -> Result<Vec<Option<Gaussian<6>>>, IoError> {
     let rig = sequence.rig.unwrap();
-    let mut config = Config { observe: Observe::Sparse, ..Config::default() };
-    // What both halves share is not in their difference.
-    config.maximum_likelihood.phase_error_px = 0.0;
+    let config = Config { observe: Observe::Sparse, ..Config::default() };
     let mut pipeline = StereoMotion::new(rig, config).unwrap();
     let hidden = |u: usize, v: usize| (u / CELL_PX + v / CELL_PX) % 2 != colour;
     pipeline.set_mask(Some(Grid::from_fn(rig.width_px, rig.height_px, hidden)));
     let motion = |files: &egomotion_io::source::FrameFiles| {
         let (left, right) = (image::read(&files.left)?, image::read(files.right.as_ref().unwrap())?);
-        let motion = pipeline.push(StereoFrame { time_s: files.time_s, left, right }).motion;
-        Ok(motion.ok().filter(|estimate| estimate.is_complete()).map(|estimate| estimate.theta))
+        let answer = pipeline.push(StereoFrame { time_s: files.time_s, left, right });
+        let complete = answer.motion.ok().filter(|estimate| estimate.is_complete());
+        // What both halves share is not in their difference.
+        Ok(complete.zip(answer.parts).map(|(estimate, parts)| Gaussian { cov: parts.own, ..estimate.theta }))
     };
     sequence.frames.iter().map(motion).collect()
 }

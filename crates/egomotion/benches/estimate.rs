@@ -10,7 +10,7 @@ use egomotion::estimate::{
     LmedsOptions, Row, TrackSource, Weighting, best_subset, best_subset_plain, lmeds, random_subsets,
     subsets_needed, systematic_response,
 };
-use egomotion::motion::{DisparityOffset, RigidPrediction};
+use egomotion::motion::{RigUncertainty, RigidPrediction};
 use egomotion::observe::tracks::{Hints, stereo_tracks};
 use egomotion::observe::{DensePair, DisparityMatcher, StereoPyramid, dense_flow};
 use egomotion::pipeline::plan::Interval;
@@ -39,7 +39,7 @@ fn estimation(c: &mut Criterion) {
         external_disparity: false,
     };
     let interval = Interval::new(&rig, &config, TrackSource::Stereo, 0.1);
-    let start = solve(&Observed::Tracks(&tracks), &interval, None).unwrap().phi();
+    let start = solve(&Observed::Tracks(&tracks), &interval, None).unwrap().motion.phi();
 
     c.bench_function("dense observations", |b| {
         b.iter(|| pair.every(config.sample_step_px, DensePair::stereo_track));
@@ -47,14 +47,17 @@ fn estimation(c: &mut Criterion) {
     c.bench_function("solve, dense", |b| {
         b.iter(|| solve(&Observed::Fields(pair, &tracks), &interval, Some(&start)));
     });
-    let motion = solve(&Observed::Fields(pair, &tracks), &interval, Some(&start)).unwrap();
+    let solved = solve(&Observed::Fields(pair, &tracks), &interval, Some(&start)).unwrap();
+    let motion = solved.motion;
     let kernel = &config.maximum_likelihood.kernel;
     c.bench_function("systematic response of tracks", |b| {
         b.iter(|| systematic_response(&tracks, &rig, &motion.phi(), kernel));
     });
-    let systematic = systematic_response(&tracks, &rig, &motion.phi(), kernel).unwrap();
-    let offset = DisparityOffset { sigma_px: 0.1, phi_per_px: systematic.phi_per_offset_px };
-    let rigid = RigidPrediction::new(&motion.theta, offset, &rig).unwrap();
+    let uncertainty = RigUncertainty {
+        sigma: config.rig_errors.sigma(0.1, &config.tolerance, &rig),
+        phi_per_error: solved.phi_per_rig_error.unwrap(),
+    };
+    let rigid = RigidPrediction::new(&motion.theta, &uncertainty, &rig).unwrap();
     c.bench_function("maps", |b| b.iter(|| motion_maps(&pair, Some(&rigid), None, &interval)));
 }
 

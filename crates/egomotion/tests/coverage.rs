@@ -13,9 +13,7 @@ use egomotion::estimate::{
 };
 use egomotion::geometry::{Gaussian, StereoRig, Twist, median};
 use egomotion::metrics::{Coverage, Nees};
-use egomotion::motion::{
-    DepthVelocity, DisparityOffset, RigidPrediction, TimeToImpact, depth_velocity as vz,
-};
+use egomotion::motion::{DepthVelocity, RigUncertainty, RigidPrediction, TimeToImpact, depth_velocity as vz};
 use egomotion::observe::{DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 use nalgebra::{Matrix3, Vector2, Vector3, Vector6};
 use rand::RngExt;
@@ -413,7 +411,7 @@ fn rigid_depth_velocity() {
         let sigma = 0.02;
         let drawn = disturbed(&motion, &mut rng);
         let measured = Vector3::new(xyd.x, xyd.y, xyd.z + sigma * normals::<1>(&mut rng)[0]);
-        let prediction = RigidPrediction::new(&drawn, DisparityOffset::none(), &rig).unwrap();
+        let prediction = RigidPrediction::new(&drawn, &RigUncertainty::none(), &rig).unwrap();
         let got = prediction.depth_velocity(&measured, sigma).unwrap().z_vz;
         let p = rig.point(&xyd).unwrap();
         nees.add(&got, &Vector2::new(p.z, truth.exp().apply(&p).z - p.z));

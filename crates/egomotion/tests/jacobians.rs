@@ -7,7 +7,7 @@ use egomotion::estimate::{
 };
 use egomotion::geometry::{CayleyMotion, Gaussian, RigidMotion, Twist};
 use egomotion::motion::{
-    DepthVelocity, DisparityOffset, RigidPrediction, depth_velocity as vz, rotation_left_out, scaled_depth,
+    DepthVelocity, RigUncertainty, RigidPrediction, depth_velocity as vz, rotation_left_out, scaled_depth,
 };
 use egomotion::observe::{DepthChange, DepthFlow, DepthTrack, StereoFlow, StereoTrack};
 use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, SVector, Vector2, Vector3, Vector4, Vector6};
@@ -379,7 +379,7 @@ fn covariance_of_the_rigid_prediction() {
             let motion = Twist::from_vector(&m.fixed_rows::<6>(1).into()).exp();
             Vector2::new(p.z, motion.apply(&p).z - p.z)
         };
-        let prediction = RigidPrediction::new(&motion, DisparityOffset::none(), &rig).unwrap();
+        let prediction = RigidPrediction::new(&motion, &RigUncertainty::none(), &rig).unwrap();
         let got = prediction.depth_velocity(&xyd, sigma).unwrap().z_vz;
         assert!((got.mean - of(&raw.mean)).norm() < 1e-12);
         let want: Matrix2<f64> = propagated(of, &raw, 1e-3);

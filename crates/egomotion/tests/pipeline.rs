@@ -1,7 +1,7 @@
 //! The whole way from images to motion, on small rendered sequences whose truth is known.
 
 use egomotion::estimate::Estimate;
-use egomotion::geometry::{Gaussian, Grid, Image, Twist};
+use egomotion::geometry::{Gaussian, Grid, Image, RigErrors, Twist};
 use egomotion::metrics::Nees;
 use egomotion::motion::NoObstacle;
 use egomotion::pipeline::StageTimes;
@@ -271,6 +271,8 @@ fn answer(
             inliers: 90,
             residual_scale: 1.0,
         }),
+        parts: None,
+        rig_sigma: RigErrors::default(),
         row_disagreement_px: None,
         contradiction: None,
         obstacle: Err(NoObstacle::NothingMeasured),

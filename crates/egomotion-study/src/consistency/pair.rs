@@ -7,6 +7,7 @@ use rand_pcg::Pcg64Mcg;
 use super::depth_camera::ErringDepthCamera;
 use super::{ConsistencyRecord, CoverageBySigma, RenderedSensor};
 use crate::synthetic::{EDGE_RAYS, draw_seed};
+use egomotion::estimate::RigPrior;
 use egomotion::geometry::{RigidMotion, Twist};
 use egomotion::pipeline::{Config, FrameMotion, Observe, StereoFrame, StereoMotion};
 use egomotion::pipeline::{DenseResults, PipelineError};
@@ -73,7 +74,8 @@ impl<'a> RandomPair<'a> {
 
     /// The pipeline's answer to the frames of a stereo rig.
     fn by_stereo(&self, observe: Observe) -> Result<FrameMotion, PipelineError> {
-        let config = Config { observe, ..Config::default() };
+        // The rig that is rendered is exactly the stated one.
+        let config = Config { observe, rig_errors: RigPrior::exact(), ..Config::default() };
         let mut motion = StereoMotion::new(self.sequence.rig, config)?;
         motion.push(self.frame(0));
         Ok(motion.push(self.frame(1)))

@@ -88,7 +88,7 @@ impl ObservedPair {
     /// [`Unsolvable`] when the observations do not determine a motion.
     pub(super) fn solve(&self, config: &Config, start: Option<&Twist>) -> Result<MotionEstimate, Unsolvable> {
         let interval = self.interval(config);
-        solve(&self.observed(&interval), &interval, start)
+        Ok(solve(&self.observed(&interval), &interval, start)?.with_exact_rig())
     }
 
     /// Where corners contradict an answer.
@@ -127,7 +127,7 @@ fn motion_of(
 ) -> Result<MotionEstimate, Unsolvable> {
     let config = Config::default();
     let interval = Interval::new(rig, &config, TrackSource::Stereo, interval_s);
-    solve(&Observed::Tracks(tracks), &interval, start)
+    Ok(solve(&Observed::Tracks(tracks), &interval, start)?.with_exact_rig())
 }
 
 fn matched(frames: &[StereoFrame; 2]) -> Result<[DisparityMap; 2], DisparityError> {

@@ -12,7 +12,7 @@ use egomotion::estimate::MotionEstimate;
 use egomotion::estimate::cramer_rao_bound;
 use egomotion::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
 use egomotion::motion::depth_velocity;
-use egomotion::motion::{DisparityOffset, RigidPrediction};
+use egomotion::motion::{RigUncertainty, RigidPrediction};
 use egomotion::pipeline::{Approach, EstimatorKind, Method};
 
 /// φ by a contender whose rows are weighted at a motion.
@@ -96,7 +96,7 @@ impl<'a> Trial<'a> {
         let sigma_d = model.disparity_variance().sqrt();
         let variances = |cov: &Matrix6<f64>| {
             let phi = Gaussian { mean: world.phi.vector(), cov: *cov };
-            let rigid = RigidPrediction::new(&phi, DisparityOffset::none(), rig);
+            let rigid = RigidPrediction::new(&phi, &RigUncertainty::none(), rig);
             let of = |p: &&UsablePixel| rigid?.depth_velocity(&p.xyd, sigma_d);
             draw.pixels.iter().map(|p| of(p).map_or(f64::NAN, |vz| vz.vz().variance())).collect()
         };

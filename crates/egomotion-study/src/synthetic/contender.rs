@@ -111,6 +111,7 @@ impl Contender {
             // Points of the synthetic world share no error of a matcher.
             maximum_likelihood: MaximumLikelihoodOptions {
                 phase_error_px: 0.0,
+                field_error_px: 0.0,
                 ..MaximumLikelihoodOptions::default()
             },
             ..Config::default()
@@ -137,7 +138,7 @@ impl Contender {
             }
             Method::Dv => solver.binocular(&draw.motions),
             Method::Joint => solver.joint(&draw.motions),
-            _ => solver.likelihood(&draw.complete),
+            _ => solver.likelihood(&draw.complete).map(|solved| solved.with_exact_rig()),
         }
     }
 
@@ -164,7 +165,7 @@ impl Contender {
             Method::Joint => solver.joint(&flows()),
             Method::Rigid => solver.alignment(&draw.motions, Form::Rigid),
             Method::Linear22 => solver.alignment(&draw.motions, Form::Affine),
-            Method::Ml => solver.likelihood(&draw.complete),
+            Method::Ml => solver.likelihood(&draw.complete).map(|solved| solved.with_exact_rig()),
         }
     }
 }

@@ -8,7 +8,7 @@
 use nalgebra::{ArrayStorage, Matrix3, Matrix6, SMatrix, Vector3, Vector4};
 
 use crate::geometry::gaussian::{accumulate, product};
-use crate::geometry::{RigidMotion, StereoRig, Twist};
+use crate::geometry::{RIG_ERRORS, RigErrors, RigidMotion, StereoRig, Twist};
 use crate::observe::{StereoFlow, StereoTrack};
 
 /// How far a structure may move from where it was measured, in standard deviations.
@@ -59,11 +59,16 @@ pub struct Misclosure {
     pub inverse_cov: Matrix3<f64>,
     /// −∂e/∂δ, where δ is the small motion of [`Measurement::small_motion_jacobian`].
     pub motion_jacobian: SMatrix<f64, 3, 6>,
-    /// ∂e per pixel by which every disparity is too large, before and after.
-    pub(crate) offset_jacobian: Vector3<f64>,
+}
+
+/// How the misclosure e of an observation changes with errors that all observations of a pair share.
+#[derive(Debug, Clone, Copy)]
+pub struct SharedJacobian {
     /// ∂e per pixel of the amplitude by which x, y, and disparity (of flows the right camera's x) err with
     /// their sub-pixel phase, one a column.
-    pub(crate) phase_jacobian: Matrix3<f64>,
+    pub(crate) phase: Matrix3<f64>,
+    /// ∂e per unit of each of [`RigErrors`].
+    pub(crate) rig: SMatrix<f64, 3, RIG_ERRORS>,
 }
 
 /// S⁻¹ by S = L D Lᵀ; `None` unless S is positive definite, which rounding or a careless caller may break.
@@ -96,6 +101,14 @@ pub trait Measurement: Copy + Send + Sync {
     fn structure(&self) -> Vector3<f64>;
     /// Linearise about a motion and a structure, and improve the structure; `None` behind the camera.
     fn linearise(&self, structure: &mut Vector3<f64>, at: &LinearisationPoint<'_>) -> Option<Misclosure>;
+    /// Image coordinates (x, y) where the point is in the later frame, in pixels.
+    fn later_position(&self) -> (f64, f64);
+    /// How the misclosure changes with shared errors, at a structure; `None` behind the camera.
+    fn shared_jacobian(
+        &self,
+        structure: &Vector3<f64>,
+        at: &LinearisationPoint<'_>,
+    ) -> Option<SharedJacobian>;
     /// ∂δ/∂φ of the small motion δ by which observations of this kind are linearised: it is the same for
     /// all of them, so it is applied to sums.
     fn small_motion_jacobian(at: &LinearisationPoint<'_>) -> Matrix6<f64>;
@@ -163,18 +176,27 @@ impl Measurement for StereoTrack {
             *s = improved;
         }
         let motion_jacobian = at.rig.velocity_jacobian(&predicted);
-        let offset_jacobian = Vector3::z() - structure_jacobian.column(2);
+        Some(Misclosure { e, inverse_cov, motion_jacobian })
+    }
+
+    fn later_position(&self) -> (f64, f64) {
+        (self.after.mean.x, self.after.mean.y)
+    }
+
+    fn shared_jacobian(&self, s: &Vector3<f64>, at: &LinearisationPoint<'_>) -> Option<SharedJacobian> {
+        let (predicted, structure_jacobian) = predict(s, at)?;
         let (before, after) = (&self.before.mean, &self.after.mean);
         // What matching displaces is the shift, of which the disparity is a constant away.
         let shift = |d: f64| at.rig.shift_from_disparity(d);
-        let phase_jacobian = Matrix3::from_data(ArrayStorage([
+        let phase = Matrix3::from_data(ArrayStorage([
             [phase_wave(after.x - before.x), 0.0, 0.0],
             [0.0, phase_wave(after.y - before.y), 0.0],
             (Vector3::z() * phase_wave(shift(after.z))
                 - structure_jacobian.column(2) * phase_wave(shift(before.z)))
             .into(),
         ]));
-        Some(Misclosure { e, inverse_cov, motion_jacobian, offset_jacobian, phase_jacobian })
+        let [early, late] = [s, &predicted].map(|xyd| RigErrors::jacobian(xyd, at.rig));
+        Some(SharedJacobian { phase, rig: late - structure_jacobian * early })
     }
 
     /// Motions are composed: exp(φ + dφ) = exp(δ) exp(φ).
@@ -236,16 +258,40 @@ impl Measurement for StereoFlow {
             s.z = improved;
         }
         let motion_jacobian = at.rig.velocity_jacobian(&Vector3::new(x, y, d));
-        let (x, y, right) = (phase_wave(measured[1]), phase_wave(measured[2]), phase_wave(measured[3]));
-        let phase_jacobian =
-            Matrix3::from_data(ArrayStorage([[x, 0.0, x], [0.0, y, 0.0], [0.0, 0.0, -right]]));
-        Some(Misclosure {
-            e,
-            inverse_cov,
-            motion_jacobian,
-            offset_jacobian: -disparity_jacobian,
-            phase_jacobian,
-        })
+        Some(Misclosure { e, inverse_cov, motion_jacobian })
+    }
+
+    fn later_position(&self) -> (f64, f64) {
+        (self.x_px + self.measured.mean[1], self.y_px + self.measured.mean[2])
+    }
+
+    fn shared_jacobian(&self, s: &Vector3<f64>, at: &LinearisationPoint<'_>) -> Option<SharedJacobian> {
+        let (x, y, d) = (s.x, s.y, s.z);
+        if d <= 0.0 {
+            return None;
+        }
+        let (f, bf) = (at.rig.focal_px, at.rig.depth_disparity_product());
+        let (t, w) = (&at.phi.t, &at.phi.omega);
+        // ∂(v_x, v_y, Δv)/∂(x, y, d) of what `linearise` predicts.
+        let going = -t.z * d / bf;
+        let structure_jacobian = Matrix3::new(
+            going + (2.0 * x * w.y - y * w.x) / f,
+            -x / f * w.x - w.z,
+            (f * t.x - x * t.z) / bf,
+            y / f * w.y + w.z,
+            going + (x * w.y - 2.0 * y * w.x) / f,
+            (f * t.y - y * t.z) / bf,
+            d / f * w.y,
+            -d / f * w.x,
+            2.0 * going - (y * w.x - x * w.y) / f,
+        );
+        let measured = &self.measured.mean;
+        let [x_wave, y_wave, right] = [1, 2, 3].map(|i| phase_wave(measured[i]));
+        let phase =
+            Matrix3::from_data(ArrayStorage([[x_wave, 0.0, x_wave], [0.0, y_wave, 0.0], [0.0, 0.0, -right]]));
+        let moved = s + 0.5 * Vector3::new(measured[1], measured[2], measured[1] - measured[3]);
+        let [here, early, late] = [*s, 2.0 * s - moved, moved].map(|xyd| RigErrors::jacobian(&xyd, at.rig));
+        Some(SharedJacobian { phase, rig: late - early - structure_jacobian * here })
     }
 
     /// Velocities add up.

@@ -11,4 +11,4 @@ pub use linear::LinearConstraint;
 #[cfg(test)]
 pub(crate) use misclosure::phase_wave;
 pub(crate) use misclosure::predict;
-pub use misclosure::{LinearisationPoint, Measurement, Misclosure};
+pub use misclosure::{LinearisationPoint, Measurement, Misclosure, SharedJacobian};

@@ -36,6 +36,7 @@ mod motion_estimate;
 mod random_subsets;
 mod sensor;
 mod serde_array;
+mod solved_motion;
 mod student_t;
 mod unsolvable;
 
@@ -61,7 +62,10 @@ pub use random_subsets::{random_subsets, subsets_needed};
 pub(crate) use sensor::augmented::augmented_step;
 pub use sensor::errors::TrackSource;
 pub(crate) use sensor::errors::{SensedTrack, SensorErrors};
+pub use sensor::rig_prior::RigPrior;
 pub(crate) use sensor::tolerance::SensorPrior;
 pub use sensor::tolerance::{HAND_ACCELERATION_M_S2, HAND_ACCELERATION_RAD_S2, Tolerance};
+pub(crate) use solved_motion::LastMotion;
+pub use solved_motion::{CovarianceParts, MATCHING_ERRORS, SolvedMotion};
 pub use student_t::StudentT;
 pub use unsolvable::Unsolvable;

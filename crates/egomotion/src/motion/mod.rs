@@ -11,6 +11,6 @@ pub use depth_velocity::DepthVelocity;
 pub use impact::TimeToImpact;
 pub(crate) use obstacle::nearest_obstacle;
 pub use obstacle::{NoObstacle, Obstacle, ObstacleCriteria, Sightings};
-pub use rigid_prediction::{DisparityOffset, RigidPrediction};
+pub use rigid_prediction::{RigUncertainty, RigidPrediction};
 pub use scaled_depth::{rotation_left_out, scaled_depth};
 pub use vehicle::Vehicle;

@@ -1,10 +1,10 @@
 //! What a pixel would do as part of a rigid scene, and whether it does.
 
-use nalgebra::{Matrix2, Matrix3, Matrix6, Vector2, Vector3, Vector6};
+use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, Vector2, Vector3, Vector6};
 
 use super::depth_velocity::DepthVelocity;
 use crate::geometry::distribution::CHI2_2_P9973;
-use crate::geometry::{Gaussian, RigidMotion, StereoRig, Twist};
+use crate::geometry::{Gaussian, RIG_ERRORS, RigErrors, RigidMotion, StereoRig, Twist};
 
 /// The rigid motion φ with what every pixel's prediction shares.
 ///
@@ -17,46 +17,65 @@ pub struct RigidPrediction<'a> {
     /// Covariance of δ, and of (δtZ, δΩX, δΩY).
     motion_cov: Matrix6<f64>,
     cov: Matrix3<f64>,
-    /// Standard deviation of the offset of disparity, δ per pixel of it, and (δtZ, δΩX, δΩY) of that.
-    offset_sigma_px: f64,
-    motion_by_offset: Vector6<f64>,
-    depth_by_offset: Vector3<f64>,
+    /// The rig's errors that are not certain.
+    rig_errors: [SharedError; RIG_ERRORS],
+    /// How many of them there are: the first ones of the list.
+    uncertain: usize,
 }
 
-/// An unknown offset common to all disparities: what an imperfect calibration does to the rig.
+/// An error of the rig, of the size of its standard deviation: what it does to disparity and to the motion.
+#[derive(Debug, Clone, Copy)]
+struct SharedError {
+    /// Which of [`RigErrors`] it is.
+    number: usize,
+    sigma: f64,
+    /// δ, and (δtZ, δΩX, δΩY) of it.
+    motion: Vector6<f64>,
+    depth: Vector3<f64>,
+}
+
+/// How certain a rig is, and how φ̂ answers to its errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DisparityOffset {
-    /// Its standard deviation, in pixels.
-    pub sigma_px: f64,
-    /// How φ changes per pixel of it.
-    pub phi_per_px: Vector6<f64>,
+pub struct RigUncertainty {
+    /// Standard deviations of the errors.
+    pub sigma: RigErrors,
+    /// ∂φ̂/∂errors, 6×8.
+    pub phi_per_error: SMatrix<f64, 6, RIG_ERRORS>,
 }
 
-impl DisparityOffset {
-    /// A perfect calibration.
+impl RigUncertainty {
+    /// Of a rig that is exactly as stated.
     pub fn none() -> Self {
-        Self { sigma_px: 0.0, phi_per_px: Vector6::zeros() }
+        Self { sigma: RigErrors::default(), phi_per_error: SMatrix::zeros() }
     }
 }
 
 impl<'a> RigidPrediction<'a> {
-    /// Predict with φ ± its covariance; `None` where some component of φ is unknown.
+    /// Predict with φ ± what is new in its pair; `None` where some component of φ is unknown.
     ///
-    /// The offset makes the part of the variance that is calibration's.
-    pub fn new(phi: &Gaussian<6>, offset: DisparityOffset, rig: &'a StereoRig) -> Option<Self> {
+    /// The rig's errors move φ and every pixel's own disparity together.
+    pub fn new(phi: &Gaussian<6>, uncertainty: &RigUncertainty, rig: &'a StereoRig) -> Option<Self> {
         let twist = Twist::from_vector(&phi.mean);
         // exp(φ + dφ) = exp(J dφ) exp(φ).
         let phi_jacobian = twist.left_jacobian();
         let motion_cov = phi_jacobian * phi.cov * phi_jacobian.transpose();
-        let motion_by_offset = phi_jacobian * offset.phi_per_px;
+        let sigma = uncertainty.sigma.vector();
+        let of = |number: usize| {
+            let motion = phi_jacobian * uncertainty.phi_per_error.column(number) * sigma[number];
+            let depth = motion.fixed_rows::<3>(2).into();
+            SharedError { number, sigma: sigma[number], motion, depth }
+        };
+        // Those that are certain come last.
+        let mut rig_errors: [SharedError; RIG_ERRORS] = std::array::from_fn(of);
+        rig_errors.sort_by_key(|error| error.sigma == 0.0);
+        let uncertain = rig_errors.iter().filter(|error| error.sigma > 0.0).count();
         phi.cov.iter().all(|v| v.is_finite()).then(|| Self {
             rig,
             motion: twist.exp(),
             motion_cov,
             cov: motion_cov.fixed_view::<3, 3>(2, 2).into(),
-            offset_sigma_px: offset.sigma_px,
-            motion_by_offset,
-            depth_by_offset: motion_by_offset.fixed_rows::<3>(2).into(),
+            rig_errors,
+            uncertain,
         })
     }
 
@@ -85,9 +104,14 @@ impl<'a> RigidPrediction<'a> {
             return false;
         }
         let flow_jacobian = self.rig.velocity_jacobian(&predicted).fixed_rows::<2>(0).into_owned();
-        let flow_by_offset = (flow_jacobian * self.motion_by_offset + flow_by_d) * self.offset_sigma_px;
-        let motion_part = flow_jacobian * self.motion_cov * flow_jacobian.transpose();
-        outside(&apart, &(cov + motion_part + flow_by_offset * flow_by_offset.transpose()))
+        let mut cov = cov + flow_jacobian * self.motion_cov * flow_jacobian.transpose();
+        let place_jacobian = RigErrors::jacobian(xyd, self.rig);
+        for error in &self.rig_errors[..self.uncertain] {
+            let disparity = place_jacobian[(2, error.number)] * error.sigma;
+            let flow_by_error = flow_jacobian * error.motion + flow_by_d * disparity;
+            cov += flow_by_error * flow_by_error.transpose();
+        }
+        outside(&apart, &cov)
     }
 
     /// Z and VZ of the still world's point (x, y, d), from the noise `sigma_d` of d and that of φ.
@@ -107,20 +131,31 @@ impl<'a> RigidPrediction<'a> {
         let z_by_d = -p.z * per_px;
         let vz_by_d = (self.motion.translation.z - (moved.z - p.z)) * per_px;
         let var = sigma_d * sigma_d;
-        // The offset moves φ and this pixel's own disparity together.
-        let (offset_sigma, depth_by_offset) = (self.offset_sigma_px, &self.depth_by_offset);
-        let z_by_offset = z_by_d * offset_sigma;
-        let vz_by_offset = (depth_by_offset.x + moved.y * depth_by_offset.y - moved.x * depth_by_offset.z
-            + vz_by_d)
-            * offset_sigma;
-        let cross = z_by_d * vz_by_d * var + z_by_offset * vz_by_offset;
-        let cov = Matrix2::new(
-            z_by_d * z_by_d * var + z_by_offset * z_by_offset,
-            cross,
-            cross,
-            vz_by_d * vz_by_d * var + quadratic(&self.cov, moved.y, -moved.x) + vz_by_offset * vz_by_offset,
-        );
+        let mut z_variance = z_by_d * z_by_d * var;
+        let mut cross = z_by_d * vz_by_d * var;
+        let mut vz_variance = vz_by_d * vz_by_d * var + quadratic(&self.cov, moved.y, -moved.x);
+        // The rig's errors move φ and this pixel's own disparity together.
+        let disparity_by_error = self.disparity_by_error(p, d);
+        for error in &self.rig_errors[..self.uncertain] {
+            let disparity = disparity_by_error[error.number] * error.sigma;
+            let by_motion = error.depth.x + moved.y * error.depth.y - moved.x * error.depth.z;
+            let (z, vz) = (z_by_d * disparity, by_motion + vz_by_d * disparity);
+            z_variance += z * z;
+            cross += z * vz;
+            vz_variance += vz * vz;
+        }
+        let cov = Matrix2::new(z_variance, cross, cross, vz_variance);
         DepthVelocity { z_vz: Gaussian { mean: Vector2::new(p.z, moved.z - p.z), cov } }
+    }
+}
+
+impl RigidPrediction<'_> {
+    /// ∂d/∂errors of [`RigErrors::jacobian`], of the point P whose disparity is d.
+    #[inline(always)]
+    fn disparity_by_error(&self, p: &Vector3<f64>, d: f64) -> [f64; RIG_ERRORS] {
+        let (f, per_depth) = (self.rig.focal_px, p.z.recip());
+        let (x, y) = ((p.x - self.rig.baseline_m) * per_depth, p.y * per_depth);
+        [-f * (1.0 + x * x), f * x * y, f * y, -f * x, d, 0.0, 0.0, d]
     }
 }
 
@@ -145,7 +180,7 @@ mod tests {
         let rig = StereoRig::new(400.0, (159.5, 119.5), 0.2, (320, 240)).unwrap();
         let phi = Twist { t: Vector3::new(0.0, 0.0, -0.5), omega: Vector3::zeros() };
         let phi = Gaussian { mean: phi.vector(), cov: Matrix6::identity() * 1e-8 };
-        let rigid = RigidPrediction::new(&phi, DisparityOffset::none(), &rig).unwrap();
+        let rigid = RigidPrediction::new(&phi, &RigUncertainty::none(), &rig).unwrap();
         let xyd = Vector3::new(60.0, 40.0, 10.0);
         let still = (rigid.moved(&xyd).unwrap() - xyd).xy();
         let flow = |error: Vector2<f64>| Gaussian { mean: still + error, cov: Matrix2::identity() * 0.01 };
@@ -160,7 +195,7 @@ mod tests {
         assert!(rigid.contradicts_flow(&xyd, 1.0, &flow(across * 0.4)));
         // An uncertain motion explains both.
         let vague = Gaussian { cov: Matrix6::identity() * 1e-4, ..phi };
-        let vague = RigidPrediction::new(&vague, DisparityOffset::none(), &rig).unwrap();
+        let vague = RigidPrediction::new(&vague, &RigUncertainty::none(), &rig).unwrap();
         assert!(!vague.contradicts_flow(&xyd, 0.0, &flow(across * 0.4)));
     }
 }

@@ -10,7 +10,7 @@
 
 use nalgebra::{Matrix4, SMatrix, Vector3, Vector4};
 
-use crate::geometry::Gaussian;
+use crate::geometry::{Gaussian, RigErrors, StereoRig};
 
 /// Disparity, its gradient and its rate at one pixel, and the flow there: what (7) and (11) need.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -159,6 +159,13 @@ impl StereoFlow {
 }
 
 impl StereoTrack {
+    /// Take known errors of a rig away.
+    pub(crate) fn correct(&mut self, errors: &RigErrors, rig: &StereoRig) {
+        for end in [&mut self.before, &mut self.after] {
+            end.mean = errors.corrected(&end.mean, rig);
+        }
+    }
+
     /// The flow that the discrete DV method works with: displacement, and Δv → (d′ − d) Z′/Z.
     pub fn discrete_flow(&self) -> StereoFlow {
         let (a, b) = (self.before.mean, self.after.mean);

@@ -4,9 +4,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::interpret::{MotionMaps, MovingGroup};
-use super::solve::Contradiction;
+use super::solve::{Contradiction, PairMotion};
 use super::stages::StageTimes;
-use crate::estimate::{MotionEstimate, Unsolvable};
+use crate::estimate::{CovarianceParts, LastMotion, MotionEstimate, Unsolvable};
+use crate::geometry::RigErrors;
 use crate::motion::{NoObstacle, Obstacle, TimeToImpact};
 use crate::observe::{DisparityMap, FlowField};
 
@@ -32,8 +33,12 @@ pub struct FrameMotion {
     pub time_s: f64,
     /// Time since the reference, in seconds.
     pub dt_s: Option<f64>,
-    /// φ over that interval, or why there is none.
+    /// φ over that interval with all of its uncertainty, or why there is none.
     pub motion: Result<MotionEstimate, Unanswered>,
+    /// Of what the covariance of φ is made; `None` without φ.
+    pub parts: Option<CovarianceParts>,
+    /// Standard deviations of the rig's errors that the covariance allows for.
+    pub rig_sigma: RigErrors,
     /// By how much matches of left and right lie on different rows in the reference frame, in pixels:
     /// how well the pair is rectified.
     pub row_disagreement_px: Option<f64>,
@@ -63,6 +68,8 @@ impl FrameMotion {
             time_s,
             dt_s: reference.map(|(_, before_s)| time_s - before_s),
             motion: Err(why),
+            parts: None,
+            rig_sigma: RigErrors::default(),
             row_disagreement_px: None,
             contradiction: None,
             obstacle: Err(NoObstacle::NothingMeasured),
@@ -85,7 +92,9 @@ impl FrameMotion {
             reference: Some(reference),
             time_s,
             dt_s: Some(time_s - before_s),
-            motion: pair.motion,
+            parts: pair.motion.as_ref().ok().map(|motion| motion.parts),
+            rig_sigma: pair.rig_sigma,
+            motion: pair.motion.map(|motion| motion.estimate),
             row_disagreement_px: pair.row_disagreement_px,
             contradiction: pair.contradiction,
             obstacle: pair.obstacle,
@@ -103,7 +112,10 @@ impl FrameMotion {
 
 /// What is found between two frames.
 pub(super) struct PairAnswer {
-    pub(super) motion: Result<MotionEstimate, Unanswered>,
+    pub(super) motion: Result<PairMotion, Unanswered>,
+    /// What the next pair needs of the motion.
+    pub(super) last: Option<LastMotion>,
+    pub(super) rig_sigma: RigErrors,
     pub(super) row_disagreement_px: Option<f64>,
     pub(super) contradiction: Option<Contradiction>,
     pub(super) obstacle: Result<Obstacle, NoObstacle>,
@@ -115,6 +127,8 @@ impl PairAnswer {
     pub(super) fn none(why: Unsolvable) -> Self {
         Self {
             motion: Err(why.into()),
+            last: None,
+            rig_sigma: RigErrors::default(),
             row_disagreement_px: None,
             contradiction: None,
             obstacle: Err(NoObstacle::NothingMeasured),

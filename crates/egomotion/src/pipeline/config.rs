@@ -4,7 +4,7 @@ use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::estimate::{LmedsOptions, MaximumLikelihoodOptions, StudentT, Tolerance};
+use crate::estimate::{LmedsOptions, MaximumLikelihoodOptions, RigPrior, StudentT, Tolerance};
 use crate::geometry::RigError;
 use crate::motion::Vehicle;
 use crate::observe::disparity::DisparityExpert;
@@ -83,6 +83,8 @@ pub struct Config {
     pub sample_step_px: usize,
     /// How well the sensor is known, for method `ml`; all zero: a depth camera's is that of its kind, a stereo rig is exact.
     pub tolerance: Tolerance,
+    /// What is known of the errors of a stereo rig.
+    pub rig_errors: RigPrior,
     /// What the vehicle sweeps.
     pub vehicle: Vehicle,
     /// Corners and their tracks.
@@ -110,6 +112,7 @@ impl Default for Config {
             block_px: 48.0,
             sample_step_px: 3,
             tolerance: Tolerance::default(),
+            rig_errors: RigPrior::default(),
             vehicle: Vehicle::default(),
             tracks: TrackOptions::default(),
             disparity: DisparityOptions::default(),
@@ -129,6 +132,7 @@ pub fn meaning(path: &[&str]) -> Option<&'static str> {
     match path {
         [name] => of::<Config>(name),
         ["tolerance", name] => of::<Tolerance>(name),
+        ["rig_errors", name] => of::<RigPrior>(name),
         ["vehicle", name] => of::<Vehicle>(name),
         ["tracks", name] => of::<TrackOptions>(name),
         ["disparity", name] => of::<DisparityOptions>(name),
@@ -248,7 +252,12 @@ impl Config {
                 ml.phase_error_px.is_finite() && ml.phase_error_px >= 0.0,
                 "maximum_likelihood.phase_error_px must not be negative",
             ),
+            (
+                ml.field_error_px.is_finite() && ml.field_error_px >= 0.0,
+                "maximum_likelihood.field_error_px must not be negative",
+            ),
             (self.tolerance.is_valid(), "tolerance: each must be finite and not negative"),
+            (self.rig_errors.is_valid(), "rig_errors: each must be finite, and no sigma negative"),
             (
                 self.vehicle.left_m < self.vehicle.right_m && self.vehicle.top_m < self.vehicle.bottom_m,
                 "vehicle: left_m must be less than right_m, top_m less than bottom_m",

@@ -1,8 +1,10 @@
 //! What is given of one time: images, and what is known of them already.
 
+use nalgebra::Vector3;
+
 use super::answer::Unanswered;
 use super::memory::TimedFrame;
-use crate::geometry::{Field, Grid, Image, StereoRig};
+use crate::geometry::{Field, Grid, Image, RigErrors, StereoRig};
 use crate::observe::tracks::StereoCorner;
 use crate::observe::{DisparityMap, FlowField, StereoPyramid};
 
@@ -155,6 +157,17 @@ pub(super) fn erase(field: &mut Field, mask: &Grid<bool>) {
             if masked {
                 *value = f32::NAN;
             }
+        }
+    }
+}
+
+/// Take known errors of the right camera away from the shifts.
+pub(super) fn correct(shift: &mut Field, errors: &RigErrors, rig: &StereoRig) {
+    for v in 0..shift.height() {
+        for (u, value) in shift.row_mut(v).iter_mut().enumerate() {
+            let (x, y) = rig.image_from_pixel(u as f64, v as f64);
+            let xyd = Vector3::new(x, y, rig.disparity_from_shift(f64::from(*value)));
+            *value -= errors.disparity_excess_px(&xyd, rig) as f32;
         }
     }
 }

@@ -7,6 +7,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::answer::{FrameMotion, Unanswered};
+use super::shared::Shared;
+use crate::estimate::LastMotion;
 use crate::geometry::Twist;
 use crate::observe::tracks::StereoCorner;
 
@@ -55,12 +57,21 @@ pub struct Memory<F> {
     velocity: Option<Twist>,
     /// Frames since the reference that gave no answer though they were good.
     failures: usize,
+    /// What all pairs share.
+    shared: Shared,
 }
 
 impl<F> Memory<F> {
     /// Of no frame yet.
     pub(super) fn new() -> Self {
-        Self { frames: 0, last_time_s: None, earlier: None, velocity: None, failures: 0 }
+        Self {
+            frames: 0,
+            last_time_s: None,
+            earlier: None,
+            velocity: None,
+            failures: 0,
+            shared: Shared::default(),
+        }
     }
 
     /// Index that the next frame has.
@@ -105,41 +116,47 @@ impl<F> Memory<F> {
         self.velocity.map(|velocity| velocity.scaled(dt_s))
     }
 
+    /// What all pairs share.
+    pub(super) fn shared(&self) -> &Shared {
+        &self.shared
+    }
+
     /// What is left of it when `keep` has taken what it needs of each frame.
     pub(super) fn kept<G>(&self, keep: impl Fn(&F) -> G) -> Memory<G> {
-        let &Self { frames, last_time_s, velocity, failures, .. } = self;
         let earlier = self.earlier.as_ref().map(|Earlier { reference, newest }| Earlier {
             reference: keep(reference),
             newest: newest.as_ref().map(&keep),
         });
-        Memory { frames, last_time_s, earlier, velocity, failures }
+        let Self { frames, last_time_s, velocity, failures, ref shared, .. } = *self;
+        Memory { frames, last_time_s, earlier, velocity, failures, shared: shared.clone() }
     }
 
     /// The same memory with something else kept of each frame.
-    pub(super) fn map<G>(self, change: impl FnMut(F) -> G) -> Memory<G> {
-        let Self { frames, last_time_s, earlier, velocity, failures } = self;
-        Memory {
-            frames,
-            last_time_s,
-            earlier: earlier.map(|earlier| earlier.map(change)),
-            velocity,
-            failures,
-        }
+    pub(super) fn map<G>(mut self, change: impl FnMut(F) -> G) -> Memory<G> {
+        let earlier = self.earlier.take().map(|earlier| earlier.map(change));
+        self.with_earlier(earlier)
     }
 
     /// The memory again, with the frames that `restore` makes of what was kept.
     ///
     /// # Errors
     /// Those of `restore`.
-    pub(super) fn restored<G, E>(self, mut restore: impl FnMut(F) -> Result<G, E>) -> Result<Memory<G>, E> {
-        let Self { frames, last_time_s, earlier, velocity, failures } = self;
-        let earlier = match earlier {
+    pub(super) fn restored<G, E>(
+        mut self,
+        mut restore: impl FnMut(F) -> Result<G, E>,
+    ) -> Result<Memory<G>, E> {
+        let earlier = match self.earlier.take() {
             Some(Earlier { reference, newest }) => {
                 Some(Earlier { reference: restore(reference)?, newest: newest.map(restore).transpose()? })
             }
             None => None,
         };
-        Ok(Memory { frames, last_time_s, earlier, velocity, failures })
+        Ok(self.with_earlier(earlier))
+    }
+
+    fn with_earlier<G>(self, earlier: Option<Earlier<G>>) -> Memory<G> {
+        let Self { frames, last_time_s, velocity, failures, shared, .. } = self;
+        Memory { frames, last_time_s, earlier, velocity, failures, shared }
     }
 }
 
@@ -166,7 +183,14 @@ impl<F: TimedFrame> Memory<F> {
     ///
     /// After a failure the reference stays, however many frames fail: a robot that saw nothing for a while is then matched
     /// with what it saw before.
-    pub(super) fn remember(&mut self, answer: &FrameMotion, earlier: Earlier<F>, here: F) -> Option<F> {
+    pub(super) fn remember(
+        &mut self,
+        answer: &FrameMotion,
+        last: Option<LastMotion>,
+        earlier: Earlier<F>,
+        here: F,
+    ) -> Option<F> {
+        self.shared.remember(answer.row_disagreement_px, last.map(|last| (self.frames, last)));
         self.frames += 1;
         self.failures = if answer.motion.is_ok() { 0 } else { self.failures + 1 };
         self.velocity = match (&answer.motion, answer.dt_s) {

@@ -2,7 +2,7 @@
 
 use super::answer::{DenseResults, FrameMotion, Unanswered};
 use super::config::{Config, Observe, PipelineError};
-use super::frame::{Frame, PreparedFrame, erase, erase_partners, sized};
+use super::frame::{Frame, PreparedFrame, correct, erase, erase_partners, sized};
 use super::frame_pair::{Compared, FramePair};
 use super::memory::{Earlier, KeptFrame, Memory};
 use super::stages::{StageTimes, timed};
@@ -159,7 +159,8 @@ impl StereoMotion {
                 (compared, before) = (other, newest);
             }
         }
-        let Compared { answer, fields, corners } = compared;
+        let Compared { mut answer, fields, corners } = compared;
+        let last = answer.last.take();
         // After an answer the earlier frame is not needed again.
         let disparity =
             if answer.motion.is_ok() { before.disparity.take() } else { before.disparity.clone() };
@@ -167,7 +168,7 @@ impl StereoMotion {
             fields.zip(disparity).map(|((flow, motion), disparity)| DenseResults { disparity, flow, motion });
         let moments = ((before.frame, before.time_s), (here.frame, here.time_s));
         let answer = FrameMotion::of_pair(moments.0, moments.1, answer, dense, stages);
-        let gone = self.memory.remember(&answer, earlier, PreparedFrame { corners, ..here });
+        let gone = self.memory.remember(&answer, last, earlier, PreparedFrame { corners, ..here });
         self.spare = gone.map(|gone| gone.images);
         answer
     }
@@ -181,7 +182,7 @@ impl StereoMotion {
         stages: &mut StageTimes,
     ) -> Compared {
         let masks = [self.mask.as_ref(), self.mask_right.as_ref()];
-        let pair = FramePair::new(before, here, &self.rig, &self.config, masks);
+        let pair = FramePair::new(before, here, &self.rig, &self.config, masks, self.memory.shared());
         pair.compare(expected, &mut self.flow_space, stages)
     }
 
@@ -228,6 +229,7 @@ impl StereoMotion {
 
     /// The given disparity, or that of the images when observing densely, without what is masked.
     fn disparity(&mut self, given: Option<DisparityMap>, images: &StereoPyramid) -> Option<DisparityMap> {
+        let matched = given.is_none();
         let mut map = match (given, self.config.observe) {
             (Some(given), _) => given,
             (None, Observe::Sparse) => return None,
@@ -240,6 +242,10 @@ impl StereoMotion {
         }
         if let Some(mask) = &self.mask_right {
             erase_partners(&mut map.shift, mask);
+        }
+        let known = self.config.rig_errors.values();
+        if matched && !known.is_none() {
+            correct(&mut map.shift, &known, &self.rig);
         }
         Some(map)
     }

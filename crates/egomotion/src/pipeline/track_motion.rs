@@ -10,9 +10,9 @@ use super::config::{Config, ConfigError, Method, Observe, PipelineError};
 use super::interpret;
 use super::memory::{Earlier, Memory, TimedFrame};
 use super::plan::Interval;
-use super::solve::{Observed, contradiction, first_motion, refined_motion, solve};
+use super::solve::{Observed, contradiction, first_motion, refined_motion, solve, whole_motion};
 use super::stages::{StageTimes, timed};
-use crate::estimate::TrackSource;
+use crate::estimate::{LastMotion, TrackSource};
 use crate::geometry::median;
 use crate::geometry::{Gaussian, StereoRig};
 use crate::observe::StereoTrack;
@@ -144,28 +144,32 @@ impl TrackMotion {
 
     /// The answer of a frame and those before, and what the next one needs of them.
     fn answer(&mut self, earlier: Earlier<TrackedFrame>, here: TrackedFrame) -> FrameMotion {
-        let mut answer = self.compare(&earlier.reference, &here);
+        let (mut answer, mut last) = self.compare(&earlier.reference, &here);
         if answer.motion.is_err()
             && let Some(newest) = &earlier.newest
         {
             let other = self.compare(newest, &here);
-            if other.motion.is_ok() {
-                answer = other;
+            if other.0.motion.is_ok() {
+                (answer, last) = other;
             }
         }
-        self.memory.remember(&answer, earlier, here);
+        self.memory.remember(&answer, last, earlier, here);
         answer
     }
 
-    /// The motion between two frames.
-    fn compare(&self, before: &TrackedFrame, after: &TrackedFrame) -> FrameMotion {
+    /// The motion between two frames, and what the next pair needs of it.
+    fn compare(&self, before: &TrackedFrame, after: &TrackedFrame) -> (FrameMotion, Option<LastMotion>) {
         let mut stages = StageTimes::default();
         let dt_s = after.time_s - before.time_s;
         let expected = self.memory.expected_motion(dt_s);
         let pairs = before.pairs(after);
         let tracks: Vec<StereoTrack> = pairs
             .iter()
-            .map(|(a, b)| StereoTrack { before: self.located(a), after: self.located(b) })
+            .map(|(a, b)| {
+                let mut track = StereoTrack { before: self.located(a), after: self.located(b) };
+                track.correct(&self.config.rig_errors.values(), &self.rig);
+                track
+            })
             .filter(|track| track.before.mean.z > 0.0 && track.after.mean.z > 0.0)
             .collect();
         let mut rows: Vec<f64> = pairs.iter().map(|(a, _)| a.right.1 - a.left.1).collect();
@@ -173,16 +177,38 @@ impl TrackMotion {
         let interval = Interval::new(&self.rig, &self.config, TrackSource::Stereo, dt_s);
         let start = first_motion(&tracks, &interval, expected.as_ref());
         let observed = Observed::Tracks(&tracks);
-        let motion = timed(&mut stages.estimate_ms, || solve(&observed, &interval, Some(&start?)));
-        let linear = motion.as_ref().ok().filter(|_| interval.plan.equations.are_linear());
+        let solved = timed(&mut stages.estimate_ms, || solve(&observed, &interval, Some(&start?)));
+        let linear = solved.as_ref().ok().filter(|_| interval.plan.equations.are_linear());
         let contradiction = linear.zip(start.ok()).and_then(|(motion, start)| {
-            contradiction(motion, &refined_motion(&tracks, &interval, &start).ok()?, &observed, &interval)
+            contradiction(
+                &motion.motion,
+                &refined_motion(&tracks, &interval, &start).ok()?,
+                &observed,
+                &interval,
+            )
         });
-        let obstacle = interpret::tracks(&tracks, motion.as_ref().ok(), rows, &interval);
-        let motion = motion.map_err(Unanswered::from);
-        let answer =
-            PairAnswer { motion, row_disagreement_px: rows, contradiction, obstacle, moving: Vec::new() };
-        FrameMotion::of_pair(before.moment(), after.moment(), answer, None, stages)
+        let shared = self.memory.shared();
+        let rig_sigma = shared.rig_sigma(rows, &self.config, &self.rig);
+        let last = shared.last_until(before.frame);
+        let (motion, last) = match solved {
+            Ok(solved) => {
+                let (motion, last) = whole_motion(solved, &tracks, &interval, &rig_sigma, last);
+                (Ok(motion), last)
+            }
+            Err(why) => (Err(Unanswered::from(why)), None),
+        };
+        let obstacle = interpret::tracks(&tracks, motion.as_ref().ok(), &interval);
+        let moving = Vec::new();
+        let answer = PairAnswer {
+            motion,
+            last: None,
+            rig_sigma,
+            row_disagreement_px: rows,
+            contradiction,
+            obstacle,
+            moving,
+        };
+        (FrameMotion::of_pair(before.moment(), after.moment(), answer, None, stages), last)
     }
 
     /// (x, y, d): v is the mean of both images', and u is that of the left one.

@@ -2,5 +2,6 @@
 
 pub(super) mod blocks;
 pub(super) mod covariance;
+pub(super) mod neighbours;
 pub(super) mod observability;
 pub(super) mod undetermined;

@@ -35,7 +35,7 @@ pub fn efficient<M: LikelihoodTerm>(
 ) -> Option<Gaussian<6>> {
     let gaussian = StudentT { nu: f64::INFINITY, ..StudentT::default() };
     let residuals = ResidualModel { mixture: Mixture::student(&gaussian), scale2: 1.0 };
-    let weighing = Weighing { blocks: None, residuals };
+    let weighing = Weighing { blocks: None, in_later: false, residuals };
     let sums = FrameSums::linearised(
         observations,
         &mut structures.to_vec(),

@@ -18,6 +18,7 @@ use super::systematic::SystematicResponse;
 use crate::constrain::{LinearisationPoint, Measurement};
 use crate::estimate::certainty::blocks::{BlockScore, Blocks};
 use crate::estimate::certainty::covariance::{covariance, model_covariance};
+use crate::estimate::certainty::neighbours::BlockInfluences;
 use crate::estimate::certainty::observability::Observability;
 use crate::estimate::motion_estimate::{Estimate, MotionEstimate};
 use crate::estimate::student_t::{LEAST_SCALE2, StudentT};
@@ -62,6 +63,9 @@ pub struct MaximumLikelihoodOptions {
     pub seed: u64,
     /// Standard deviation of the phase error's amplitude, in pixels.
     pub phase_error_px: f64,
+    /// Standard deviation of the field error, in pixels: matches in a block of the image are off by it together, in all
+    /// frames.
+    pub field_error_px: f64,
 }
 
 impl Default for MaximumLikelihoodOptions {
@@ -73,19 +77,22 @@ impl Default for MaximumLikelihoodOptions {
             start_observations: 600,
             seed: 1,
             phase_error_px: 0.003,
+            field_error_px: 0.003,
         }
     }
 }
 
 /// A maximum-likelihood estimate with what tests and studies ask of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MaximumLikelihood {
     /// φ̂ with its covariance.
     pub motion: MotionEstimate,
     /// Σ eᵀ S⁻¹ e at the estimate, without robust weights.
     pub cost: f64,
-    /// How φ̂ answers to systematic errors; `None` where some direction is not determined.
+    /// How φ̂ answers to systematic errors; `None` without blocks, and where some direction is not determined.
     pub systematic: Option<SystematicResponse>,
+    /// The influences of the blocks of the earlier frame and of the later one; `None` where the former is.
+    pub(crate) influences: Option<[BlockInfluences; 2]>,
     /// How residuals were weighed.
     pub(crate) residuals: ResidualModel,
 }
@@ -162,8 +169,15 @@ fn maximise<M: LikelihoodTerm>(
     kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
     let near = Iterate::begin(observations, rig, start, kernel)?.approach(few, rig, kernel)?;
-    let (found, sums) = near.settle(observations, rig, blocks, kernel)?;
-    finish(&found, &sums, observations.len(), blocks, kernel)
+    let settled = near.settle(observations, rig, blocks, kernel)?;
+    finish(settled, observations, rig, blocks, kernel)
+}
+
+/// Where the iteration ends: the sums of its last step, and the structures.
+struct Settled {
+    iterate: Iterate,
+    sums: FrameSums,
+    structures: Vec<Vector3<f64>>,
 }
 
 /// Where the iteration is.
@@ -198,8 +212,8 @@ impl Iterate {
         let rough = StudentT { tolerance: COARSE_TOLERANCE, ..*kernel };
         for _ in 0..if kernel.nu.is_finite() && kernel.fitted { RESIDUAL_FITS } else { 1 } {
             // Few observations may leave open what all determine.
-            let Ok((found, _)) = self.settle(observations, rig, None, &rough) else { return Ok(self) };
-            self = Self::begin(observations, rig, &found.phi, kernel)?;
+            let Ok(found) = self.settle(observations, rig, None, &rough) else { return Ok(self) };
+            self = Self::begin(observations, rig, &found.iterate.phi, kernel)?;
         }
         Ok(self)
     }
@@ -213,13 +227,13 @@ impl Iterate {
         rig: &StereoRig,
         blocks: Option<&Blocks>,
         kernel: &StudentT,
-    ) -> Result<(Self, FrameSums), Unsolvable> {
+    ) -> Result<Settled, Unsolvable> {
         let mut structures: Vec<Vector3<f64>> = observations.iter().map(Measurement::structure).collect();
         let (mut damping, mut last_moved) = (0.0, 0.0);
         let mut accepted: Option<Accepted> = None;
         for iteration in 0..kernel.iterations {
             let at = LinearisationPoint::new(self.phi, rig);
-            let weighing = Weighing { blocks, residuals: self.residuals };
+            let weighing = Weighing { blocks, in_later: false, residuals: self.residuals };
             let sums = FrameSums::linearised(observations, &mut structures, &at, &weighing);
             let cost = sums.whole.cost(self.residuals.scale2);
             if let Some(best) = accepted.as_ref().filter(|best| best.is_better_than(cost, &sums.whole)) {
@@ -249,24 +263,26 @@ impl Iterate {
             last_moved = moved;
             // The first step was one with structures as measured: where it ends depends on their noise.
             if iteration > 0 && damping == 0.0 && rest <= kernel.tolerance * self.residuals.scale2.sqrt() {
-                return Ok((self, sums));
+                return Ok(Settled { iterate: self, sums, structures });
             }
             accepted = Some(Accepted { phi: from, structures: structures.clone(), cost, sums });
         }
         // Expectation and maximisation come near the end slowly: what is left of the way is small beside φ's own error.
         let near = damping == 0.0 && last_moved <= LAST_STEP_SIGMAS * self.residuals.scale2.sqrt();
-        accepted.filter(|_| near).map(|last| (self, last.sums)).ok_or(Unsolvable::NotConverged)
+        let end = |last: Accepted| Settled { iterate: self, sums: last.sums, structures };
+        accepted.filter(|_| near).map(end).ok_or(Unsolvable::NotConverged)
     }
 }
 
 /// The answer from the sums of the last step, which was less than the tolerance.
-fn finish(
-    found: &Iterate,
-    sums: &FrameSums,
-    rows: usize,
+fn finish<M: LikelihoodTerm>(
+    settled: Settled,
+    observations: &[M],
+    rig: &StereoRig,
     blocks: Option<&Blocks>,
     kernel: &StudentT,
 ) -> Result<MaximumLikelihood, Unsolvable> {
+    let Settled { iterate: found, sums, structures } = settled;
     let whole = &sums.whole;
     let observability = Observability::of(&whole.score.information)?;
     let cov = match blocks {
@@ -278,43 +294,66 @@ fn finish(
         None => model_covariance(whole.spread(), &observability),
     };
     let freedom = (3 * whole.used).saturating_sub(6).max(1) as f64;
+    let at = LinearisationPoint::new(found.phi, rig);
+    let systematic = blocks.and_then(|_| SystematicResponse::of(observations, &at, &found.residuals, blocks));
+    let influences = systematic.zip(blocks).and_then(|(_, blocks)| {
+        let weighing = Weighing { blocks: Some(blocks), in_later: true, residuals: found.residuals };
+        influences(&sums, observations, structures, &at, &weighing)
+    });
     Ok(MaximumLikelihood {
         motion: Estimate {
             theta: Gaussian { mean: observability.with_unobserved_nan(&found.phi.vector()), cov },
             observed: observability.observed(),
             undetermined: observability.undetermined(),
-            rows,
+            rows: observations.len(),
             inliers: whole.inliers,
             residual_scale: (whole.weighted_square / freedom).sqrt(),
         },
         cost: whole.square,
-        systematic: SystematicResponse::of(whole),
+        systematic,
+        influences,
         residuals: found.residuals,
     })
 }
 
+/// The influence of each block of the earlier frame, of the last step's sums, and of each of the later one.
+fn influences<M: LikelihoodTerm>(
+    sums: &FrameSums,
+    observations: &[M],
+    mut structures: Vec<Vector3<f64>>,
+    at: &LinearisationPoint<'_>,
+    in_later: &Weighing<'_>,
+) -> Option<[BlockInfluences; 2]> {
+    let inverse = sums.whole.bread().try_inverse()?;
+    let later = FrameSums::linearised(observations, &mut structures, at, in_later);
+    let of =
+        |sums: &FrameSums| BlockInfluences(sums.by_block.iter().map(|b| inverse * b.score.score).collect());
+    Some([of(sums), of(&later)])
+}
+
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
+    use nalgebra::{SVector, Vector3};
 
     use super::*;
     use crate::constrain::phase_wave;
     use crate::estimate::likelihood::systematic::systematic_response;
+    use crate::geometry::{RIG_ERRORS, RigErrors};
     use crate::observe::StereoTrack;
 
-    fn tracks(rig: &StereoRig, phi: &Twist, amplitude: Vector3<f64>, offset: f64) -> Vec<StereoTrack> {
+    fn tracks(rig: &StereoRig, phi: &Twist, amplitude: Vector3<f64>, errors: RigErrors) -> Vec<StereoTrack> {
         let variances = [0.01, 0.01, 0.02];
         let place = |i: usize| {
             let (a, b, c) = ((i * 37 % 200) as f64, (i * 53 % 150) as f64, (i * 17 % 31) as f64);
             Vector3::new(a - 100.0, b - 75.0, 8.0 + c)
         };
         let moved = |xyd: &Vector3<f64>| rig.project(&phi.exp().apply(&rig.point(xyd).unwrap())).unwrap();
-        let d = Vector3::new(0.0, 0.0, offset);
+        let wrong = |xyd: Vector3<f64>| xyd + RigErrors::jacobian(&xyd, rig) * errors.vector();
         let seen = |i: usize| {
             let (before, after) = (place(i), moved(&place(i)));
             let moved = (after - before).xy().map(phase_wave);
             let phase = Vector3::new(moved.x, moved.y, phase_wave(after.z)).component_mul(&amplitude);
-            (before + Vector3::z() * amplitude.z * phase_wave(before.z) + d, after + phase + d)
+            (wrong(before) + Vector3::z() * amplitude.z * phase_wave(before.z), wrong(after) + phase)
         };
         let track = |(before, after): (Vector3<f64>, Vector3<f64>)| StereoTrack {
             before: Gaussian::independent(before.into(), [0.0, 0.0, 0.02]),
@@ -328,18 +367,22 @@ mod tests {
         let rig = StereoRig::new(400.0, (159.5, 119.5), 0.15, (320, 240)).unwrap();
         let phi = Twist { t: Vector3::new(0.02, -0.01, -0.2), omega: Vector3::new(0.004, -0.006, 0.002) };
         let kernel = StudentT { nu: f64::INFINITY, iterations: 50, tolerance: 1e-10, ..StudentT::default() };
-        let solve = |amplitude, offset| {
-            let tracks = tracks(&rig, &phi, amplitude, offset);
+        let solve = |amplitude, errors| {
+            let tracks = tracks(&rig, &phi, amplitude, errors);
             maximum_likelihood(&tracks, &rig, &phi, None, &kernel).unwrap().motion.theta.mean - phi.vector()
         };
-        let exact = tracks(&rig, &phi, Vector3::zeros(), 0.0);
+        let exact = tracks(&rig, &phi, Vector3::zeros(), RigErrors::default());
         let found = systematic_response(&exact, &rig, &phi, &kernel).unwrap();
-        let scale = found.phi_per_offset_px.amax();
         for k in 0..3 {
-            let error = solve(Vector3::ith(k, 1e-3), 0.0) / 1e-3 - found.phi_per_phase_px.column(k);
+            let error =
+                solve(Vector3::ith(k, 1e-3), RigErrors::default()) / 1e-3 - found.phi_per_phase_px.column(k);
             assert!(error.amax() < 2e-3 * found.phi_per_phase_px.column(k).amax(), "{k} {error}");
         }
-        let error = solve(Vector3::zeros(), 1e-3) / 1e-3 - found.phi_per_offset_px;
-        assert!(error.amax() < 2e-3 * scale, "{error} {scale}");
+        let expected = found.phi_per_rig_error;
+        for k in 0..RIG_ERRORS {
+            let errors = RigErrors::from_vector(&SVector::ith(k, 1e-5));
+            let error = solve(Vector3::zeros(), errors) / 1e-5 - expected.column(k);
+            assert!(error.amax() < 5e-3 * expected.column(k).amax(), "{k} {error} {}", expected.column(k));
+        }
     }
 }

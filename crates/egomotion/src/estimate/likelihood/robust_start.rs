@@ -131,7 +131,7 @@ fn concentrated(phi: &Twist, sample: &[StereoTrack], rig: &StereoRig) -> Twist {
             mixture: Mixture::within(CONCENTRATION_Q),
             scale2: (middle / CHI2_3_P50).max(LEAST_SCALE2),
         };
-        let weighing = Weighing { blocks: None, residuals };
+        let weighing = Weighing { blocks: None, in_later: false, residuals };
         let whole = FrameSums::linearised(sample, &mut structures, &at, &weighing).whole;
         let next = Observability::of(&whole.score.information)
             .and_then(|observability| observability.solve(&whole.score.information, &whole.score.score));

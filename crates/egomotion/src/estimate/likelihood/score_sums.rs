@@ -1,6 +1,6 @@
 //! The sums over all observations from which maximum likelihood makes one Gauss–Newton step.
 
-use nalgebra::{ArrayStorage, Matrix6, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::mixture::ResidualModel;
@@ -28,8 +28,6 @@ pub struct ScoreSums {
     pub(crate) score: BlockScore<6>,
     /// By how much the score's true derivative is less than the information, because weights change as well.
     reweighting: Matrix6<f64>,
-    /// Σ w Gᵀ S⁻¹ δe for errors that all observations share: amplitudes of the phase error of x, y and d, an offset of disparity.
-    pub(crate) systematic: SMatrix<f64, 6, 4>,
     /// Σ w.
     weights: f64,
     /// Σ w q.
@@ -53,6 +51,8 @@ pub struct ScoreSums {
 pub struct Weighing<'a> {
     /// Blocks whose sums are wanted; without them all is one block.
     pub(crate) blocks: Option<&'a Blocks>,
+    /// Whether an observation lies in the block where the later frame shows it, not the earlier one.
+    pub(crate) in_later: bool,
     /// How misclosures are distributed.
     pub(crate) residuals: ResidualModel,
 }
@@ -106,9 +106,6 @@ impl ScoreSums {
         accumulate(&mut self.score.score, &weighted, &l.e);
         let change = weight * slope / scale2;
         accumulate(&mut self.reweighting, &(unweighted * change), &unweighted.transpose());
-        let [x, y, d] = l.phase_jacobian.data.0;
-        let errors = SMatrix::<f64, 3, 4>::from_data(ArrayStorage([x, y, d, l.offset_jacobian.into()]));
-        accumulate(&mut self.systematic, &weighted, &errors);
         self.weights += weight;
         self.weighted_square += weight * q;
         self.score_square += weight * weight * q;
@@ -123,7 +120,6 @@ impl ScoreSums {
         self.score.information += other.score.information;
         self.score.score += other.score.score;
         self.reweighting += other.reweighting;
-        self.systematic += other.systematic;
         self.weights += other.weights;
         self.weighted_square += other.weighted_square;
         self.score_square += other.score_square;
@@ -141,7 +137,6 @@ impl ScoreSums {
         self.score.information = across * self.score.information * jacobian;
         self.score.score = across * self.score.score;
         self.reweighting = across * self.reweighting * jacobian;
-        self.systematic = across * self.systematic;
         self
     }
 }
@@ -235,7 +230,7 @@ fn strip<M: Measurement>(
     let mut runs = Vec::new();
     let mut run = (0, ScoreSums::default());
     for (observation, structure) in observations.iter().zip(structures) {
-        let (x, y) = observation.position();
+        let (x, y) = if weighing.in_later { observation.later_position() } else { observation.position() };
         let block = weighing.blocks.map_or(0, |blocks| blocks.index(x, y));
         if block != run.0 {
             if run.1.used > 0 {

@@ -9,7 +9,7 @@
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use rayon::prelude::*;
 
-use super::errors::{CALIBRATION, ERRORS, SHUTTER, SensedTrack, SensorErrors, TrackSource};
+use super::errors::{ERRORS, RIGHT_CAMERA, SHUTTER, SensedTrack, SensorErrors, TrackSource};
 use super::tolerance::SensorPrior;
 use crate::constrain::{LinearisationPoint, Measurement};
 use crate::estimate::certainty::blocks::{BlockScore, Blocks};
@@ -17,14 +17,12 @@ use crate::estimate::certainty::covariance::covariance;
 use crate::estimate::certainty::observability::Observability;
 use crate::estimate::likelihood::maximum_likelihood::MaximumLikelihood;
 use crate::estimate::likelihood::mixture::ResidualModel;
-use crate::geometry::StereoRig;
 use crate::geometry::gaussian::product;
+use crate::geometry::{RIG_ERRORS, StereoRig};
 use crate::observe::StereoTrack;
 
 /// Number of all unknowns: φ and the errors.
 const ALL: usize = 6 + ERRORS;
-/// Number of the unknowns of which all observations speak: the motion of the scene and the calibration.
-const BASE: usize = 6 + CALIBRATION;
 /// Observations handled by one task; fixed, so that sums do not depend on the number of threads.
 const STRIP: usize = 512;
 
@@ -35,8 +33,11 @@ pub(crate) struct AugmentedStep {
     pub step: Vector6<f64>,
     /// The errors after the step.
     pub errors: SensorErrors,
-    /// Covariance of φ with what the errors add.
+    /// Covariance of φ with what the errors of this pair add, but not the calibration's, which other pairs share.
     pub cov: Matrix6<f64>,
+    /// ∂φ̂/∂(errors of the calibration), 6×8: what the pair could not tell of them. Zero for those of which nothing is
+    /// allowed for.
+    pub phi_per_rig_error: SMatrix<f64, 6, RIG_ERRORS>,
 }
 
 /// Step from what was `found` of `observations` from which `errors` are taken already; `None` where some direction of
@@ -59,6 +60,7 @@ pub(crate) fn augmented_step(
         step: solved.step.fixed_rows::<6>(0).into(),
         errors: SensorErrors::from_vector(&moved),
         cov: solved.covariance(&by_block)?,
+        phi_per_rig_error: solved.phi_per_rig_error(&unit),
     })
 }
 
@@ -148,11 +150,15 @@ impl AugmentedSums {
         let one = Weighed { jacobian, inverse_cov: inverse_cov * weight, misclosure: l.e, reweighting };
         // Of the errors of other parts of the sensor the derivatives are zero.
         match sensed.source {
-            TrackSource::Stereo => self.add_columns::<BASE>(&one, |i| i),
-            TrackSource::Image => self.add_columns::<ALL>(&one, |i| i),
-            TrackSource::Depth => {
-                self.add_columns::<{ ALL - SHUTTER }>(&one, |i| if i < BASE { i } else { i + SHUTTER })
+            TrackSource::Stereo => self.add_columns::<{ 6 + RIG_ERRORS }>(&one, |i| i),
+            TrackSource::Image => {
+                self.add_columns::<{ ALL - RIGHT_CAMERA }>(&one, |i| if i < 6 { i } else { i + RIGHT_CAMERA })
             }
+            TrackSource::Depth => self.add_columns::<{ ALL - RIGHT_CAMERA - SHUTTER }>(&one, |i| match i {
+                0..6 => i,
+                _ if i + RIGHT_CAMERA < 6 + RIG_ERRORS => i + RIGHT_CAMERA,
+                _ => i + RIGHT_CAMERA + SHUTTER,
+            }),
         }
     }
 
@@ -245,8 +251,21 @@ impl AugmentedSolution {
         let total: Matrix6<f64> = scores.iter().map(|block| block.information).sum();
         let observability = Observability::of(&total).ok()?;
         let cov = covariance(&scores, Some(&of_phi), &observability);
-        let cov = cov + self.design_effect.powi(2) * across * across.transpose();
+        // The calibration is the same in all pairs: what it leaves open is no part of this one's own.
+        let apart = across.fixed_columns::<{ ERRORS - RIG_ERRORS }>(RIG_ERRORS);
+        let cov = cov + apart * apart.transpose() * self.design_effect.powi(2);
         cov.iter().all(|v| v.is_finite()).then_some(cov)
+    }
+}
+
+impl AugmentedSolution {
+    /// How φ̂ answers to errors of the calibration, of which `unit` is the inverse of their prior standard deviations.
+    ///
+    /// Without noise H (δφ, û − u) = −D (0, u), so that φ̂ moves by −D H⁻¹ u.
+    fn phi_per_rig_error(&self, unit: &SVector<f64, ERRORS>) -> SMatrix<f64, 6, RIG_ERRORS> {
+        let across: SMatrix<f64, 6, RIG_ERRORS> = self.inverse.fixed_view::<6, RIG_ERRORS>(0, 6).into();
+        let unit: SVector<f64, RIG_ERRORS> = unit.fixed_rows::<RIG_ERRORS>(0).into();
+        across * SMatrix::from_diagonal(&unit) * -self.design_effect
     }
 }
 

@@ -11,17 +11,17 @@
 //! middle row, by the motion φ itself and by its change (Meilland, Drummond and Comport 2013; Kerl, Stückler and
 //! Cremers 2015).
 
-use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 
 use crate::constrain::{LinearisationPoint, predict};
-use crate::geometry::{Gaussian, StereoRig, Twist};
+use crate::geometry::{Gaussian, RIG_ERRORS, RigErrors, StereoRig, Twist};
 use crate::observe::StereoTrack;
 
-/// Number of a sensor's errors: focal length, principal point (2), scale, read-out, change of motion during read-out (6),
-/// motion between image and depth (6).
-pub(crate) const ERRORS: usize = CALIBRATION + SHUTTER + 6;
-/// The first this many of them are the calibration, of which every observation speaks.
-pub(crate) const CALIBRATION: usize = 4;
+/// Number of a sensor's errors: the rig's, read-out, change of motion during read-out (6), motion between image and
+/// depth (6).
+pub(crate) const ERRORS: usize = RIG_ERRORS + SHUTTER + 6;
+/// The first this many of the rig's errors are of its right camera, which a depth camera does not have.
+pub(crate) const RIGHT_CAMERA: usize = 4;
 /// The next this many are of the image's shutter.
 pub(crate) const SHUTTER: usize = 7;
 
@@ -53,12 +53,8 @@ pub(crate) struct SensedTrack {
 /// Values of the errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SensorErrors {
-    /// Relative error of the focal length.
-    pub focal: f64,
-    /// Error of the principal point, in pixels.
-    pub centre_px: (f64, f64),
-    /// Relative error of depth.
-    pub scale: f64,
+    /// Errors of the calibration; of a depth camera, the baseline's is that of the scale of depth.
+    pub rig: RigErrors,
     /// Time from the image's first row to its last, in intervals.
     pub readout: f64,
     /// By how much the motion that the image's last row sees exceeds that of its first.
@@ -70,21 +66,19 @@ pub(crate) struct SensorErrors {
 impl SensorErrors {
     pub(crate) fn from_vector(e: &SVector<f64, ERRORS>) -> Self {
         Self {
-            focal: e[0],
-            centre_px: (e[1], e[2]),
-            scale: e[3],
-            readout: e[4],
-            during: Twist::from_vector(&e.fixed_rows::<6>(5).into()),
-            apart: Twist::from_vector(&e.fixed_rows::<6>(11).into()),
+            rig: RigErrors::from_vector(&e.fixed_rows::<RIG_ERRORS>(0).into()),
+            readout: e[RIG_ERRORS],
+            during: Twist::from_vector(&e.fixed_rows::<6>(RIG_ERRORS + 1).into()),
+            apart: Twist::from_vector(&e.fixed_rows::<6>(RIG_ERRORS + SHUTTER).into()),
         }
     }
 
     pub(crate) fn vector(&self) -> SVector<f64, ERRORS> {
         let mut e = SVector::<f64, ERRORS>::zeros();
-        (e[0], e[1], e[2], e[3]) = (self.focal, self.centre_px.0, self.centre_px.1, self.scale);
-        e[4] = self.readout;
-        e.fixed_rows_mut::<6>(5).copy_from(&self.during.vector());
-        e.fixed_rows_mut::<6>(11).copy_from(&self.apart.vector());
+        e.fixed_rows_mut::<RIG_ERRORS>(0).copy_from(&self.rig.vector());
+        e[RIG_ERRORS] = self.readout;
+        e.fixed_rows_mut::<6>(RIG_ERRORS + 1).copy_from(&self.during.vector());
+        e.fixed_rows_mut::<6>(RIG_ERRORS + SHUTTER).copy_from(&self.apart.vector());
         e
     }
 
@@ -107,12 +101,9 @@ impl SensorErrors {
     /// Without the errors of the calibration.
     fn calibrated(&self, sensed: &SensedTrack, rig: &StereoRig) -> SensedTrack {
         let mut track = sensed.track;
-        let focal = 1.0 + self.focal;
-        let depth = (1.0 + self.scale) * if sensed.source == TrackSource::Stereo { focal } else { 1.0 };
+        let errors = self.rig.vector();
         for end in [&mut track.before, &mut track.after] {
-            let [x, y, d] = end.mean.into();
-            let centred = (x - self.centre_px.0, y - self.centre_px.1 * rig.aspect());
-            end.mean = Vector3::new(centred.0 / focal, centred.1 / focal, d / depth);
+            end.mean -= sensed.source.calibration_jacobian(&end.mean, rig) * errors;
         }
         SensedTrack { track, ..*sensed }
     }
@@ -195,16 +186,14 @@ impl SensedTrack {
     ) -> Option<SMatrix<f64, 3, ERRORS>> {
         let (predicted, structure_jacobian) = predict(structure, at)?;
         let mut jacobian = SMatrix::<f64, 3, ERRORS>::zeros();
-        jacobian.fixed_columns_mut::<CALIBRATION>(0).copy_from(&self.calibration_jacobian(
-            structure,
-            &predicted,
-            &structure_jacobian,
-            at.rig(),
-        ));
+        // At what the motion predicts, not at what was measured: that would shrink residuals by scaling them.
+        let [before, after] =
+            [structure, &predicted].map(|xyd| self.source.calibration_jacobian(xyd, at.rig()));
+        jacobian.fixed_columns_mut::<RIG_ERRORS>(0).copy_from(&(after - structure_jacobian * before));
         match self.source {
             TrackSource::Stereo => {}
             TrackSource::Depth => {
-                jacobian.fixed_columns_mut::<6>(CALIBRATION + SHUTTER).copy_from(motion_jacobian);
+                jacobian.fixed_columns_mut::<6>(RIG_ERRORS + SHUTTER).copy_from(motion_jacobian);
             }
             TrackSource::Image => {
                 // The image sees the place, the depth image what surface is there.
@@ -219,34 +208,27 @@ impl SensedTrack {
                 let readout = later * velocity(later_row) - earlier * velocity(row);
                 let during =
                     later * (0.5 * later_row * (later_time + 1.0)) - earlier * (0.5 * row * (time - 1.0));
-                jacobian.set_column(CALIBRATION, &readout);
-                jacobian.fixed_columns_mut::<6>(CALIBRATION + 1).copy_from(&during);
+                jacobian.set_column(RIG_ERRORS, &readout);
+                jacobian.fixed_columns_mut::<6>(RIG_ERRORS + 1).copy_from(&during);
                 let across = motion_jacobian.row(2) - later.row(2);
-                jacobian.fixed_view_mut::<1, 6>(2, CALIBRATION + SHUTTER).copy_from(&across);
+                jacobian.fixed_view_mut::<1, 6>(2, RIG_ERRORS + SHUTTER).copy_from(&across);
             }
         }
         Some(jacobian)
     }
+}
 
-    /// −∂e/∂(focal length, principal point, scale) of the misclosure e at a structure.
+impl TrackSource {
+    /// ∂(x, y, d)/∂(errors of the calibration) of what is measured as (x, y, d).
     ///
-    /// At what the motion predicts, not at what was measured: that would shrink residuals by scaling them.
-    fn calibration_jacobian(
-        &self,
-        structure: &Vector3<f64>,
-        predicted: &Vector3<f64>,
-        structure_jacobian: &Matrix3<f64>,
-        rig: &StereoRig,
-    ) -> SMatrix<f64, 3, CALIBRATION> {
-        let change = |after: Vector3<f64>, before: Vector3<f64>| after - structure_jacobian * before;
-        let scaled = Vector3::new(1.0, 1.0, if self.source == TrackSource::Stereo { 1.0 } else { 0.0 });
-        let (x, y, d) = (Vector3::x(), Vector3::y() * rig.aspect(), Vector3::z());
-        SMatrix::from_columns(&[
-            change(predicted.component_mul(&scaled), structure.component_mul(&scaled)),
-            change(x, x),
-            change(y, y),
-            change(predicted.component_mul(&d), structure.component_mul(&d)),
-        ])
+    /// A depth camera measures depth by itself: its focal length scales places alone.
+    fn calibration_jacobian(self, xyd: &Vector3<f64>, rig: &StereoRig) -> SMatrix<f64, 3, RIG_ERRORS> {
+        let mut jacobian = RigErrors::jacobian(xyd, rig);
+        if self != Self::Stereo {
+            jacobian.fixed_columns_mut::<RIGHT_CAMERA>(0).fill(0.0);
+            jacobian[(2, RIGHT_CAMERA)] = 0.0;
+        }
+        jacobian
     }
 }
 
@@ -259,6 +241,8 @@ fn along_surface(of_point: &SMatrix<f64, 3, 6>, slope: &Vector2<f64>) -> SMatrix
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Matrix3;
+
     use super::*;
 
     use crate::constrain::Measurement;

@@ -2,4 +2,5 @@
 
 pub(super) mod augmented;
 pub(super) mod errors;
+pub(super) mod rig_prior;
 pub(super) mod tolerance;

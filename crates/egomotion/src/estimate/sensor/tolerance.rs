@@ -5,7 +5,7 @@ use nalgebra::{SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::errors::{ERRORS, SensorErrors};
-use crate::geometry::Twist;
+use crate::geometry::{RigErrors, Twist};
 
 /// Standard deviation of the linear acceleration of a camera that is held in a hand, in m/s²: walking hands accelerate
 /// by some m/s².
@@ -57,6 +57,18 @@ impl Tolerance {
         Self { focal: 1.5e-3, centre_px: 0.3, scale: 5e-4, ..Self::default() }
     }
 
+    /// Standard deviations of a rig's errors: its own of the focal length, the principal point and the scale, and those of
+    /// the right camera as they are given.
+    pub(super) fn of_rig(&self, right_camera: RigErrors) -> RigErrors {
+        RigErrors {
+            focal: self.focal,
+            centre_x_px: self.centre_px,
+            centre_y_px: self.centre_px,
+            baseline: self.scale,
+            ..right_camera
+        }
+    }
+
     /// The prior of the errors of a pair of frames that are `dt_s` seconds apart.
     pub(crate) fn prior_over(&self, dt_s: f64) -> SensorPrior {
         // An image is read to its end before the next.
@@ -67,10 +79,9 @@ impl Tolerance {
         let moving = |[t, omega]: [f64; 2]| Twist { t: Vector3::repeat(t), omega: Vector3::repeat(omega) };
         let none = SensorErrors::from_vector(&SVector::zeros());
         let mean = SensorErrors { readout, ..none };
+        let rig = self.of_rig(RigErrors::default());
         let sigma = SensorErrors {
-            focal: self.focal,
-            centre_px: (self.centre_px, self.centre_px),
-            scale: self.scale,
+            rig,
             readout: READOUT_SHARE * readout,
             during: moving(during),
             apart: moving(apart),
@@ -108,10 +119,10 @@ mod tests {
         let prior = tolerance.prior_over(0.1);
         assert!(!prior.is_exact() && Tolerance::default().prior_over(0.1).is_exact());
         // 2 m/s² and 5 rad/s² over 0.03 s change what happens in 0.1 s by 6 mm and .86°.
-        assert!((prior.sigma[5] - 0.006).abs() < 1e-12 && (prior.sigma[10] - 0.015).abs() < 1e-12);
-        assert_eq!(prior.sigma[13], 0.0);
+        assert!((prior.sigma[9] - 0.006).abs() < 1e-12 && (prior.sigma[14] - 0.015).abs() < 1e-12);
+        assert_eq!(prior.sigma[17], 0.0);
         // Three tenths of the interval, or none, or at most all of it.
-        assert!((prior.expected().readout - 0.3).abs() < 1e-12 && (prior.sigma[4] - 0.075).abs() < 1e-12);
+        assert!((prior.expected().readout - 0.3).abs() < 1e-12 && (prior.sigma[8] - 0.075).abs() < 1e-12);
         assert_eq!(Tolerance::rendered().prior_over(0.1).expected().vector().amax(), 0.0);
         assert_eq!(tolerance.prior_over(0.01).expected().readout, 1.0);
     }

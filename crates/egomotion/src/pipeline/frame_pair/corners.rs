@@ -8,6 +8,7 @@ use crate::observe::StereoTrack;
 use crate::observe::tracks::{
     Hints, SearchStart, StereoCorner, Trace, follow, stereo_corners, tracks_from_traces,
 };
+use crate::pipeline::plan::Interval;
 use crate::pipeline::solve::first_motion;
 
 /// About this many corners find the motion that guides the others. With more it takes longer; with fewer the motion is less certain.
@@ -37,7 +38,7 @@ impl FramePair<'_> {
             Err(_) => Vec::new(),
         };
         FollowedCorners {
-            tracks: tracks_from_traces(&traces, rig),
+            tracks: self.tracks(&traces),
             motion,
             later: traces.iter().map(|trace| trace.after).collect(),
         }
@@ -62,7 +63,18 @@ impl FramePair<'_> {
                 found = free;
             }
         }
-        first_motion(&tracks_from_traces(&found, self.interval.rig), &self.interval, expected)
+        first_motion(&self.tracks(&found), &self.interval, expected)
+    }
+
+    /// Tracks without the known errors of the right camera.
+    fn tracks(&self, traces: &[Trace]) -> Vec<StereoTrack> {
+        let Interval { rig, config, plan, .. } = self.interval;
+        let mut tracks = tracks_from_traces(traces, rig);
+        let known = config.rig_errors.values();
+        if plan.source == TrackSource::Stereo && !known.is_none() {
+            tracks.iter_mut().for_each(|track| track.correct(&known, rig));
+        }
+        tracks
     }
 
     fn follow(&self, corners: &[StereoCorner], motion: Option<&Twist>, start: SearchStart) -> Vec<Trace> {

@@ -8,10 +8,11 @@ use super::config::{Config, Observe};
 use super::frame::PreparedFrame;
 use super::interpret::{self, Meaning, MotionMaps};
 use super::plan::Interval;
-use super::solve::{Contradiction, Observed, contradiction, refined_motion, solve};
+use super::shared::Shared;
+use super::solve::{Contradiction, Observed, PairMotion, contradiction, refined_motion, solve, whole_motion};
 use super::stages::{StageTimes, timed};
-use crate::estimate::{MotionEstimate, TrackSource, Unsolvable};
-use crate::geometry::{Grid, StereoRig, Twist};
+use crate::estimate::{LastMotion, MotionEstimate, SolvedMotion, TrackSource, Unsolvable};
+use crate::geometry::{Grid, RigErrors, StereoRig, Twist};
 use crate::observe::flow::FlowSpace;
 use crate::observe::tracks::StereoCorner;
 use crate::observe::{DensePair, FlowField, StereoPyramid, row_disagreement};
@@ -28,6 +29,7 @@ pub(super) struct FramePair<'a> {
     interval: Interval<'a>,
     /// Pixels of the left and of the right image never to use.
     masks: [Option<&'a Grid<bool>>; 2],
+    shared: &'a Shared,
 }
 
 /// What two frames give: the answer, what it leaves behind of every pixel, and the corners in the later frame.
@@ -38,19 +40,20 @@ pub(super) struct Compared {
 }
 
 impl<'a> FramePair<'a> {
-    /// Two frames of a rig, and the pixels of its images that are never used.
+    /// Two frames of a rig, the pixels of its images that are never used, and what it shares with the pairs before.
     pub(super) fn new(
         before: &'a PreparedFrame,
         after: &'a PreparedFrame,
         rig: &'a StereoRig,
         config: &'a Config,
         masks: [Option<&'a Grid<bool>>; 2],
+        shared: &'a Shared,
     ) -> Self {
         let both_right = before.images.has_right() && after.images.has_right();
         let both_maps = before.disparity.is_some() && after.disparity.is_some();
         let source = if both_maps && !both_right { TrackSource::Image } else { TrackSource::Stereo };
         let interval = Interval::new(rig, config, source, after.time_s - before.time_s);
-        Self { before, after, interval, masks }
+        Self { before, after, interval, masks, shared }
     }
 
     /// Observe, estimate and interpret. `expected` is the motion if it goes on as it was.
@@ -80,19 +83,16 @@ impl<'a> FramePair<'a> {
         stages: &mut StageTimes,
     ) -> PairAnswer {
         let observed = Observed::Tracks(&corners.tracks);
-        let motion = timed(&mut stages.estimate_ms, || {
+        let solved = timed(&mut stages.estimate_ms, || {
             let start = corners.motion.as_ref().map_err(|why| *why)?;
             solve(&observed, &self.interval, Some(start))
         });
-        let contradiction = self.contradiction(motion.as_ref().ok(), || self.refined(corners), &observed);
-        let obstacle = interpret::tracks(&corners.tracks, motion.as_ref().ok(), rows, &self.interval);
-        PairAnswer {
-            motion: motion.map_err(Unanswered::from),
-            row_disagreement_px: rows,
-            contradiction,
-            obstacle,
-            moving: Vec::new(),
-        }
+        let by_corners = || self.refined(corners);
+        let contradiction = self.contradiction(solved.as_ref().ok(), by_corners, &observed);
+        let (motion, last, rig_sigma) = self.whole(solved, corners, rows);
+        let obstacle = interpret::tracks(&corners.tracks, motion.as_ref().ok(), &self.interval);
+        let moving = Vec::new();
+        PairAnswer { motion, last, rig_sigma, row_disagreement_px: rows, contradiction, obstacle, moving }
     }
 
     /// The answer of every pixel: flows, observations, φ, and what it means.
@@ -108,15 +108,41 @@ impl<'a> FramePair<'a> {
         let flows = timed(&mut stages.flow_ms, || self.flows(start.as_ref(), space))?;
         let fields = self.observe(&flows)?;
         let observed = Observed::Fields(fields, &corners.tracks);
-        let motion = timed(&mut stages.estimate_ms, || solve(&observed, &self.interval, start.as_ref()));
-        let contradiction = self.contradiction(motion.as_ref().ok(), || refined, &observed);
+        let solved = timed(&mut stages.estimate_ms, || solve(&observed, &self.interval, start.as_ref()));
+        let contradiction = self.contradiction(solved.as_ref().ok(), || refined, &observed);
+        let (motion, last, rig_sigma) = self.whole(solved, corners, rows);
         let Meaning { maps, moving, obstacle } = timed(&mut stages.maps_ms, || {
-            let motion = motion.as_ref().ok();
-            interpret::fields(&fields, self.images(), &corners.tracks, motion, rows, &self.interval)
+            interpret::fields(&fields, self.images(), motion.as_ref().ok(), &self.interval)
         });
-        let motion = motion.map_err(Unanswered::from);
-        let answer = PairAnswer { motion, row_disagreement_px: rows, contradiction, obstacle, moving };
+        let answer = PairAnswer {
+            motion,
+            last,
+            rig_sigma,
+            row_disagreement_px: rows,
+            contradiction,
+            obstacle,
+            moving,
+        };
         Some((answer, flows.left, maps))
+    }
+
+    /// The whole uncertainty of a motion, what the next pair needs of it, and standard deviations of the rig's errors.
+    fn whole(
+        &self,
+        solved: Result<SolvedMotion, Unsolvable>,
+        corners: &FollowedCorners,
+        rows: Option<f64>,
+    ) -> (Result<PairMotion, Unanswered>, Option<LastMotion>, RigErrors) {
+        let Interval { rig, config, .. } = self.interval;
+        let rig_sigma = self.shared.rig_sigma(rows, config, rig);
+        let last = self.shared.last_until(self.before.frame);
+        match solved {
+            Ok(solved) => {
+                let (motion, last) = whole_motion(solved, &corners.tracks, &self.interval, &rig_sigma, last);
+                (Ok(motion), last, rig_sigma)
+            }
+            Err(why) => (Err(why.into()), None, rig_sigma),
+        }
     }
 
     /// The first motion, refined on all tracks: it predicts flow, and the estimate begins with it.
@@ -127,12 +153,12 @@ impl<'a> FramePair<'a> {
     /// Where corners contradict the answer of a method that linearises.
     fn contradiction(
         &self,
-        motion: Option<&MotionEstimate>,
+        motion: Option<&SolvedMotion>,
         by_corners: impl FnOnce() -> Option<MotionEstimate>,
         observed: &Observed<'_>,
     ) -> Option<Contradiction> {
         let motion = motion.filter(|_| self.interval.plan.equations.are_linear())?;
-        contradiction(motion, &by_corners()?, observed, &self.interval)
+        contradiction(&motion.motion, &by_corners()?, observed, &self.interval)
     }
 
     /// What every pixel shows: disparity of both frames, and the flows between them.

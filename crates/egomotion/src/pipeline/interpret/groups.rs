@@ -313,15 +313,16 @@ impl Sampled {
     /// freedom fewer than blocks, which with three blocks has none.
     fn motion(&self, rig: &StereoRig, config: &Config) -> Option<MotionEstimate> {
         let start = robust_start(&self.tracks, rig, None, &config.seeded_likelihood()).ok()?;
-        let mut found = Solver::new(rig, &start, config).likelihood(&self.tracks).ok()?;
+        let found = Solver::new(rig, &start, config).likelihood(&self.tracks).ok()?;
         let layout = Blocks::tiling(rig, config.block_px);
         let mut blocks: Vec<usize> =
             self.tracks.iter().map(|track| layout.index(track.before.mean.x, track.before.mean.y)).collect();
         blocks.sort_unstable();
         blocks.dedup();
         let freedom = blocks.len() as f64 - 1.0;
-        found.theta.cov *= if freedom > 2.0 { freedom / (freedom - 2.0) } else { f64::INFINITY };
-        found.with_unbounded_unobserved().ok()
+        let mut motion = found.with_exact_rig();
+        motion.theta.cov *= if freedom > 2.0 { freedom / (freedom - 2.0) } else { f64::INFINITY };
+        motion.with_unbounded_unobserved().ok()
     }
 
     /// Squared scale of the measured VZ about those of the body's motion, in units of their variance; at least 1.

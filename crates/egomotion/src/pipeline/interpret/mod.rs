@@ -12,10 +12,10 @@ pub use maps::{MotionMaps, motion_maps};
 use groups::Groups;
 use maps::track_sightings;
 use moving::Moving;
-use still_world::still_world;
+use still_world::{body, still_world};
 
 use super::plan::Interval;
-use crate::estimate::MotionEstimate;
+use super::solve::PairMotion;
 use crate::motion::{NoObstacle, Obstacle, ObstacleCriteria, nearest_obstacle};
 use crate::observe::{DensePair, StereoPyramid, StereoTrack};
 
@@ -26,33 +26,29 @@ pub(super) struct Meaning {
     pub(super) obstacle: Result<Obstacle, NoObstacle>,
 }
 
-/// The nearest obstacle that tracks show, whose left and right places disagree by `rows` pixels.
+/// The nearest obstacle that tracks show.
 pub(super) fn tracks(
     tracks: &[StereoTrack],
-    motion: Option<&MotionEstimate>,
-    rows: Option<f64>,
+    motion: Option<&PairMotion>,
     interval: &Interval<'_>,
 ) -> Result<Obstacle, NoObstacle> {
-    let still = still_world(tracks, motion, rows, interval).ok_or(NoObstacle::NothingMeasured)?;
+    let still = motion.and_then(|motion| still_world(motion, interval)).ok_or(NoObstacle::NothingMeasured)?;
     let mut seen = track_sightings(tracks, &still, interval);
     nearest_obstacle(&mut seen, (interval.rig.width_px, interval.rig.height_px), &ObstacleCriteria::SPARSE)
 }
 
-/// What a motion means for the pixels of dense fields, whose tracks have left and right places that disagree by `rows`
-/// pixels.
+/// What a motion means for the pixels of dense fields.
 pub(super) fn fields(
     pair: &DensePair<'_>,
     images: (&StereoPyramid, &StereoPyramid),
-    tracks: &[StereoTrack],
-    motion: Option<&MotionEstimate>,
-    rows: Option<f64>,
+    motion: Option<&PairMotion>,
     interval: &Interval<'_>,
 ) -> Meaning {
-    let still = still_world(tracks, motion, rows, interval);
+    let still = motion.and_then(|motion| still_world(motion, interval));
     let groups = still.as_ref().zip(motion).map(|(still, motion)| {
         let moving = Moving::find(pair, images, still);
-        let predict = |tracks: &[_], motion: &_| still_world(tracks, Some(motion), rows, interval);
-        Groups::find(pair, moving, interval, motion, predict)
+        let predict = |tracks: &[_], own: &_| body(tracks, own, &motion.rig_sigma, interval);
+        Groups::find(pair, moving, interval, &motion.with_exact_rig(), predict)
     });
     let (maps, mut seen) = motion_maps(pair, still.as_ref(), groups.as_ref(), interval);
     // Without a motion nobody knows what will be in the vehicle's way.

@@ -1,35 +1,31 @@
-//! What every pixel would do as part of the still world, with what a wrong calibration adds to its uncertainty.
+//! What every pixel would do as part of a rigid world, with what the rig's errors add to its uncertainty.
 
-use crate::estimate::MotionEstimate;
-use crate::estimate::systematic_response;
-use crate::motion::{DisparityOffset, RigidPrediction};
+use crate::estimate::{MotionEstimate, systematic_response};
+use crate::geometry::RigErrors;
+use crate::motion::{RigUncertainty, RigidPrediction};
 use crate::observe::StereoTrack;
 use crate::pipeline::plan::Interval;
+use crate::pipeline::solve::PairMotion;
 
-/// Standard deviation of an offset of disparity, in pixels, for each pixel by which matches of left and right lie on
-/// different rows.
-///
-/// Rows show only the vertical part of a wrong calibration; yaw, focal lengths and distortion act along rows as well.
-/// On the four KITTI scenes with laser truth the horizontal offset is 0.6 to 3.1 times the vertical one; this is the
-/// cautious end.
-const OFFSET_PER_ROW_DISAGREEMENT: f64 = 3.0;
+/// What every pixel would do as part of the still world; `None` where some component of its motion is unknown.
+pub(super) fn still_world<'a>(motion: &PairMotion, interval: &Interval<'a>) -> Option<RigidPrediction<'a>> {
+    let uncertainty =
+        RigUncertainty { sigma: motion.rig_sigma, phi_per_error: motion.parts.phi_per_rig_error };
+    RigidPrediction::new(&motion.with_exact_rig().theta, &uncertainty, interval.rig)
+}
 
-/// What every pixel would do as part of the still world; `None` without a motion.
-///
-/// How φ answers to a wrong calibration is taken from maximum likelihood on the tracks, whatever the method that found
-/// φ.
-pub(super) fn still_world<'a>(
+/// What the pixels of a body with these tracks would do by its motion, whose covariance is without the rig's errors.
+pub(super) fn body<'a>(
     tracks: &[StereoTrack],
-    motion: Option<&MotionEstimate>,
-    row_disagreement_px: Option<f64>,
+    motion: &MotionEstimate,
+    rig_sigma: &RigErrors,
     interval: &Interval<'a>,
 ) -> Option<RigidPrediction<'a>> {
-    let motion = motion?;
     let kernel = &interval.config.maximum_likelihood.kernel;
     let systematic = systematic_response(tracks, interval.rig, &motion.phi_or_zero(), kernel);
-    let offset = systematic.map_or_else(DisparityOffset::none, |systematic| DisparityOffset {
-        sigma_px: OFFSET_PER_ROW_DISAGREEMENT * row_disagreement_px.unwrap_or(0.0),
-        phi_per_px: systematic.phi_per_offset_px,
+    let uncertainty = systematic.map_or_else(RigUncertainty::none, |systematic| RigUncertainty {
+        sigma: *rig_sigma,
+        phi_per_error: systematic.phi_per_rig_error,
     });
-    RigidPrediction::new(&motion.theta, offset, interval.rig)
+    RigidPrediction::new(&motion.theta, &uncertainty, interval.rig)
 }

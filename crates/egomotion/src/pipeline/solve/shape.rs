@@ -12,8 +12,8 @@ use super::solver::{SETTLED_SIGMAS, Solver};
 use crate::constrain::LinearisationPoint;
 use crate::estimate::MaximumLikelihoodOptions;
 use crate::estimate::StudentT;
-use crate::estimate::{MotionEstimate, Unsolvable};
 use crate::estimate::{SensedTrack, SensorErrors, TrackSource};
+use crate::estimate::{SolvedMotion, Unsolvable};
 use crate::geometry::distribution::{CHI2_1_P50_COARSE, CHI2_2_P50};
 use crate::geometry::median;
 use crate::geometry::{RigidMotion, StereoRig, Twist};
@@ -42,7 +42,7 @@ pub(super) fn solve_with_shape(
     corners: &[StereoTrack],
     start: Option<&Twist>,
     interval: &Interval<'_>,
-) -> Result<MotionEstimate, Unsolvable> {
+) -> Result<SolvedMotion, Unsolvable> {
     // The mixture takes every residual as one in three dimensions; shape has one, beside which places would look like outliers.
     let config = &without_mixture(interval.config);
     let tracked = Tracked { flow: pair.every(config.sample_step_px, DensePair::stereo_track), corners };
@@ -57,8 +57,8 @@ pub(super) fn solve_with_shape(
         // Far from the answer it is not the sensor that is wrong.
         let solver = if near { solver.with_tolerance(interval.dt_s) } else { solver };
         let found = solver.round(&all, &mut errors)?;
-        let moved = found.moved_from(&phi);
-        phi = found.phi_or_zero();
+        let moved = found.motion.moved_from(&phi);
+        phi = found.motion.phi_or_zero();
         round += 1;
         if (near && moved.is_finite() && moved < SETTLED_SIGMAS) || round == SHAPE_ROUNDS {
             return Ok(found);

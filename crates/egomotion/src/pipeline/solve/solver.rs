@@ -4,14 +4,15 @@ use crate::constrain::displacement::{self, DisplacementConstraints};
 use crate::constrain::{LinearConstraint, LinearisationPoint, binocular_flow, dcce, image_flow};
 use crate::estimate::alignment::{Fitting, Form, PointPair, align};
 use crate::estimate::{
-    Blocks, LikelihoodTerm, LinearFit, LmedsOptions, MaximumLikelihood, MotionEstimate, Row, SensedTrack,
-    SensorErrors, SensorPrior, StudentT, Tolerance, TrackSource, Unsolvable, Weighting, augmented_step,
-    errors_in_variables, least_squares, lmeds, m_estimate, maximum_likelihood, two_step,
+    Blocks, LikelihoodTerm, LinearFit, LmedsOptions, MATCHING_ERRORS, MaximumLikelihood, MotionEstimate, Row,
+    SensedTrack, SensorErrors, SensorPrior, SolvedMotion, StudentT, SystematicResponse, Tolerance,
+    TrackSource, Unsolvable, Weighting, augmented_step, errors_in_variables, least_squares, lmeds,
+    m_estimate, maximum_likelihood, two_step,
 };
-use crate::geometry::{CayleyMotion, StereoRig, Twist};
+use crate::geometry::{CayleyMotion, RIG_ERRORS, StereoRig, Twist};
 use crate::observe::{DepthChange, StereoFlow, StereoTrack};
 use crate::pipeline::config::{Config, EstimatorKind};
-use nalgebra::{Matrix6, SVector};
+use nalgebra::{SMatrix, SVector};
 
 /// The sensor's errors are corrected and estimated again at most this many times.
 const SENSOR_ROUNDS: usize = 5;
@@ -65,12 +66,32 @@ impl<'a> Solver<'a> {
     ///
     /// # Errors
     /// [`Unsolvable`] when the observations do not determine a motion.
-    pub fn likelihood<M: LikelihoodTerm>(&self, observations: &[M]) -> Result<MotionEstimate, Unsolvable> {
+    pub fn likelihood<M: LikelihoodTerm>(&self, observations: &[M]) -> Result<SolvedMotion, Unsolvable> {
         let kernel = &self.kernel(observations.len());
         let found = maximum_likelihood(observations, self.rig, self.start, Some(&self.blocks), kernel)?;
-        let mut motion = found.motion;
-        motion.theta.cov += self.phase_covariance(&found);
-        Ok(motion)
+        Ok(self.solved(found))
+    }
+
+    /// What maximum likelihood found, with the part of the covariance that all matches share.
+    fn solved(&self, found: MaximumLikelihood) -> SolvedMotion {
+        let phi_per_rig_error = found.systematic.map(|systematic| systematic.phi_per_rig_error);
+        SolvedMotion {
+            motion: found.motion,
+            phi_per_matching_sigma: found
+                .systematic
+                .map_or_else(SMatrix::zeros, |s| self.phi_per_matching(&s)),
+            phi_per_rig_error,
+            influences: found.influences,
+        }
+    }
+
+    /// φ̂ by one standard deviation of each systematic error of matching.
+    fn phi_per_matching(&self, systematic: &SystematicResponse) -> SMatrix<f64, 6, MATCHING_ERRORS> {
+        let options = &self.config.maximum_likelihood;
+        let mut columns = SMatrix::<f64, 6, MATCHING_ERRORS>::zeros();
+        columns.fixed_columns_mut::<3>(0).copy_from(&(systematic.phi_per_phase_px * options.phase_error_px));
+        columns.fixed_columns_mut::<6>(3).copy_from(&(systematic.phi_per_field_px * options.field_error_px));
+        columns
     }
 
     /// How so many observations are weighed.
@@ -79,20 +100,12 @@ impl<'a> Solver<'a> {
         StudentT { fitted: kernel.fitted && observations >= FEWEST_FITTED, ..kernel }
     }
 
-    /// What the phase error adds to a covariance.
-    fn phase_covariance(&self, found: &MaximumLikelihood) -> Matrix6<f64> {
-        let known = found.motion.theta.cov.iter().all(|v| v.is_finite());
-        let sigma_px = self.config.maximum_likelihood.phase_error_px;
-        let systematic = found.systematic.filter(|_| known);
-        systematic.map_or_else(Matrix6::zeros, |systematic| systematic.phase_covariance(sigma_px))
-    }
-
     /// Maximum likelihood of tracks that a sensor made which is known only so well.
     pub(super) fn sensor_likelihood(
         &self,
         tracks: &[StereoTrack],
         source: TrackSource,
-    ) -> Result<MotionEstimate, Unsolvable> {
+    ) -> Result<SolvedMotion, Unsolvable> {
         if self.prior.is_exact() {
             return self.likelihood(tracks);
         }
@@ -103,8 +116,8 @@ impl<'a> Solver<'a> {
             let made = tracks.iter().map(|&track| SensedTrack::new(track, source, self.rig));
             let corrected: Vec<SensedTrack> = made.map(|sensed| errors.corrected(&sensed, &at)).collect();
             let found = Solver { start: &start, ..*self }.round(&corrected, &mut errors)?;
-            let moved = found.moved_from(&start);
-            start = found.phi_or_zero();
+            let moved = found.motion.moved_from(&start);
+            start = found.motion.phi_or_zero();
             round += 1;
             if moved < SETTLED_SIGMAS || round == SENSOR_ROUNDS {
                 return Ok(found);
@@ -117,23 +130,26 @@ impl<'a> Solver<'a> {
         &self,
         corrected: &[SensedTrack],
         errors: &mut SensorErrors,
-    ) -> Result<MotionEstimate, Unsolvable> {
+    ) -> Result<SolvedMotion, Unsolvable> {
         let tracks: Vec<StereoTrack> = corrected.iter().map(|sensed| sensed.track).collect();
         let kernel = &self.kernel(tracks.len());
         let blocks = &self.blocks;
         let found = maximum_likelihood(&tracks, self.rig, self.start, Some(blocks), kernel)?;
-        let (phase, mut motion) = (self.phase_covariance(&found), found.motion);
         let augmented = match self.prior.is_exact() {
             true => None,
             false => augmented_step(corrected, self.rig, &found, errors, &self.prior, blocks),
         };
+        let mut solved = self.solved(found);
         if let Some(augmented) = augmented {
-            motion.theta.mean += augmented.step;
-            motion.theta.cov = augmented.cov;
+            let theta = &mut solved.motion.theta;
+            (theta.mean, theta.cov) = (theta.mean + augmented.step, augmented.cov);
+            if let Some(response) = &mut solved.phi_per_rig_error {
+                let estimated = (0..RIG_ERRORS).filter(|&k| self.prior.sigma[k] > 0.0);
+                estimated.for_each(|k| response.set_column(k, &augmented.phi_per_rig_error.column(k)));
+            }
             *errors = augmented.errors;
         }
-        motion.theta.cov += phase;
-        Ok(motion)
+        Ok(solved)
     }
 
     /// DCCE, (12).
