@@ -40,6 +40,7 @@
 //! | [`Assumptions`] | `assumptions` | 1, 3.1 and 4.3: depth against brightness, instantaneous motion |
 //! | [`Efficiency`] | `efficiency` | none: variance, bias and coverage against the Cramér–Rao bound |
 //! | [`Consistency`] | `consistency` | none: NEES and coverage of the whole image pipeline |
+//! | [`PoseConsistency`] | `consistency --rig` | none: the covariance of every pose, of rigs with errors |
 //! | [`Reliability`] | `reliability` | none: which answers of the linear methods can be believed |
 //!
 //! # Words
@@ -65,6 +66,7 @@ mod table;
 pub mod assumptions;
 pub mod consistency;
 pub mod efficiency;
+pub mod poses;
 pub mod real;
 pub mod reliability;
 pub mod sensitivity;
@@ -75,6 +77,7 @@ pub use assumptions::Assumptions;
 pub use consistency::Consistency;
 pub use efficiency::Efficiency;
 pub use figure::{Axis, Content, Figure, Layout, Line, Panel, Point, Series};
+pub use poses::PoseConsistency;
 pub use range::OutOfRange;
 pub use real::LabStudy;
 pub use reliability::Reliability;

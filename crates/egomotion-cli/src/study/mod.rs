@@ -7,15 +7,18 @@ mod table;
 mod tests;
 
 use anyhow::Result;
+use egomotion::estimate::RigPrior;
 use egomotion::pipeline::Observe;
 use egomotion_study::consistency::{DepthKind, RenderedSensor};
 use egomotion_study::synthetic::MeasurementModel;
 use egomotion_study::{
-    Assumptions, Consistency, Efficiency, LabStudy, OneSetting, Reliability, Sensitivity, Uncertainty,
+    Assumptions, Consistency, Efficiency, LabStudy, OneSetting, PoseConsistency, Reliability, Sensitivity,
+    Uncertainty,
 };
 
 use crate::args::study::{
-    ConsistencyArgs, EfficiencyArgs, LaboratoryArgs, PairSensorArg, ReliabilityArgs, StudyCommand, TableArgs,
+    ConsistencyArgs, EfficiencyArgs, LaboratoryArgs, PairSensorArg, ReliabilityArgs, RigArg, StudyCommand,
+    TableArgs,
 };
 use crate::exit::Ending;
 use crate::process::set_threads;
@@ -36,7 +39,10 @@ pub fn study(command: &StudyCommand) -> Result<Ending> {
             None => alone(&args.laboratory, &real::rendered(args)),
         },
         StudyCommand::Assumptions(args) => alone(args, &Assumptions { seed: args.seed }),
-        StudyCommand::Consistency(args) => alone(&args.laboratory, &consistency(args)),
+        StudyCommand::Consistency(args) => match args.rig {
+            Some(rig) => alone(&args.laboratory, &poses(args, rig)),
+            None => alone(&args.laboratory, &consistency(args)),
+        },
         StudyCommand::Efficiency(args) => alone(&args.laboratory, &efficiency(args)),
         StudyCommand::Reliability(args) => alone(&args.laboratory, &reliability(args)),
         StudyCommand::All(args) => {
@@ -77,6 +83,23 @@ fn sensitivity(args: &LaboratoryArgs, sequences: Vec<String>) -> Sensitivity {
 fn uncertainty(args: &LaboratoryArgs) -> Uncertainty {
     let own = Uncertainty::default();
     Uncertainty { draws: args.draws.unwrap_or(own.draws), seed: args.seed, ..own }
+}
+
+fn poses(args: &ConsistencyArgs, rig: RigArg) -> PoseConsistency {
+    let own = PoseConsistency::default();
+    PoseConsistency {
+        sequences: args.sequences.clone().unwrap_or(own.sequences),
+        width_px: args.size.0,
+        height_px: args.size.1,
+        observe: if args.sparse { Observe::Sparse } else { Observe::Dense },
+        runs: args.laboratory.draws.unwrap_or(own.runs),
+        rig: match rig {
+            RigArg::Erring => PoseConsistency::erring_rig(),
+            RigArg::Exact => RigPrior::exact(),
+        },
+        seed: args.laboratory.seed,
+        ..own
+    }
 }
 
 fn consistency(args: &ConsistencyArgs) -> Consistency {

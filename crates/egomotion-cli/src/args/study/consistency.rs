@@ -20,6 +20,10 @@ pub struct ConsistencyArgs {
     /// Tracks alone: φ, and no maps.
     #[arg(long)]
     pub sparse: bool,
+    /// Whole sequences in place of pairs, and the covariance of their poses: `erring` draws the rig's errors anew for each
+    /// run, `exact` has none [default sequences: corridor, C, lab-E].
+    #[arg(long, value_name = "RIG", num_args = 0..=1, default_missing_value = "erring")]
+    pub rig: Option<RigArg>,
     #[command(flatten)]
     pub laboratory: LaboratoryArgs,
 }
@@ -35,4 +39,13 @@ pub enum PairSensorArg {
     TimeOfFlight,
     /// Rendered images and depth in half-precision numbers.
     Rendered,
+}
+
+/// The rig that takes whole sequences.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RigArg {
+    /// One whose errors are drawn from the prior that the pipeline is told.
+    Erring,
+    /// One that is exactly as stated.
+    Exact,
 }

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 
 use super::values::positive;
-pub use consistency::{ConsistencyArgs, PairSensorArg};
+pub use consistency::{ConsistencyArgs, PairSensorArg, RigArg};
 pub use efficiency::EfficiencyArgs;
 pub use real::RealArgs;
 pub use reliability::ReliabilityArgs;
