@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
+use egomotion::estimate::RigPrior;
 use egomotion::geometry::RigCamera;
 use egomotion::metrics;
 use egomotion::pipeline::DenseResults;
@@ -31,7 +32,8 @@ const JUDGED_STEP_PX: usize = 4;
 /// Render, run, judge.
 pub fn demo(args: &DemoArgs) -> Result<Ending> {
     set_threads(args.threads)?;
-    let config = Config::default();
+    // The rig that is rendered is exactly the stated one.
+    let config = Config { rig_errors: RigPrior::exact(), ..Config::default() };
     let out: PathBuf = args.out.clone().unwrap_or_else(|| Path::new("egomotion-out").join("demo"));
     let folder = ResultFolder::create(&out)?;
     let sequence = Sequence::named("demo", None, None, 1.0).context("the demo's scene is missing")?;

@@ -166,7 +166,13 @@ fn row(frame: usize, pose: &RigidMotion) -> MotionRow {
         frame,
         time_s: 0.1 * frame as f64,
         dt_s: Some(0.1),
-        motion: Some(EstimatedMotion { phi, observed: [true; 6], rows: 16_000, inliers: 14_000 }),
+        motion: Some(EstimatedMotion {
+            phi,
+            own: Some(cov),
+            observed: [true; 6],
+            rows: 16_000,
+            inliers: 14_000,
+        }),
         impact_s: Some([2.0, 1.8, 2.3]),
         status: "ok".into(),
     }

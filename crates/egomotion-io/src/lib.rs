@@ -4,7 +4,7 @@
 //! |---|---|
 //! | recordings | [`source`] (dataset layouts), [`calibration`], [`recording`] (frames for a pipeline), [`stream`] (images end to end) |
 //! | images and maps | [`image`], [`depth`], [`disparity_png`], [`flow_png`], [`pfm`], [`flo`], [`npy`], [`ply`], [`precomputed`] |
-//! | tables | [`motion_table`], [`trajectory`], [`tracks`] |
+//! | tables | [`motion_table`], [`trajectory`], [`trajectory_covariance`], [`tracks`] |
 //! | whole tasks | [`simulation`] (a rendered sequence as a folder), [`evaluation`] (a trajectory against the truth) |
 //!
 //! Every reader comes twice: `read` takes a path, `decode` (or `parse`) takes what was read, so
@@ -44,7 +44,7 @@ pub use maps::{depth, disparity_png, flo, flow_png, npy, pfm, ply, precomputed};
 pub use source::Source;
 #[cfg(feature = "parquet")]
 pub use tables::motion_parquet;
-pub use tables::{motion_table, tracks, trajectory};
+pub use tables::{motion_table, tracks, trajectory, trajectory_covariance};
 
 /// The examples of the README, compiled with the doc tests; here because they need both libraries.
 #[cfg(doctest)]

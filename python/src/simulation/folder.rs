@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use egomotion::geometry::RigErrors;
 use egomotion_io::simulation::{SequenceFolder, Simulation, SimulationOptions};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
@@ -34,7 +35,17 @@ pub fn simulate(
         return Err(error::value("frames must be 2 to 1000000"));
     }
     let (seed, texture) = (seed.map(u64::from), texture_seed.map(u64::from));
-    let options = SimulationOptions { sequence, step, frames, size_px, noise, seed, texture, scene };
+    let options = SimulationOptions {
+        sequence,
+        step,
+        frames,
+        size_px,
+        noise,
+        seed,
+        texture,
+        scene,
+        rig_errors: RigErrors::default(),
+    };
     let simulation = py.detach(|| Simulation::new(&options)).map_err(error::options)?;
     for warning in &simulation.warnings {
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &std::ffi::CString::new(warning.as_str())?, 1)?;

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use egomotion::geometry::RigErrors;
 use egomotion_io::simulation::SimulationOptions;
 
-use super::values::{positive, size, step};
+use super::values::{positive, rig_errors, size, step};
 
 /// Most frames of a sequence, because the files of frames are numbered with six digits.
 const MAX_FRAMES: i64 = 1_000_000;
@@ -38,6 +39,10 @@ pub struct SimulateArgs {
     /// Scene (and, if it has them, rig and sensor) in place of the sequence's own, as in scene.toml.
     #[arg(long, value_name = "FILE")]
     pub scene: Option<PathBuf>,
+    /// By how much the rig that takes the images differs from the one that the files state: yaw_deg, pitch_deg, roll_deg,
+    /// focal_ratio, focal, centre_x_px, centre_y_px, baseline.
+    #[arg(long, value_name = "NAME=VALUE,…", value_parser = rig_errors, allow_hyphen_values = true)]
+    pub rig_error: Option<RigErrors>,
     /// Folder for the sequence [default: egomotion-out/NAME].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -61,6 +66,7 @@ impl SimulateArgs {
             seed: self.seed,
             texture: self.texture,
             scene: self.scene.clone(),
+            rig_errors: self.rig_error.unwrap_or_default(),
         }
     }
 }

@@ -1,7 +1,11 @@
 //! Values of options, read from words.
 
+use egomotion::geometry::{RIG_ERRORS, RigErrors};
 use egomotion::sim::Sequence;
 use egomotion_io::simulation::check_size;
+
+/// Largest errors of a rig that is rendered, in the order and the units of their names: with larger ones it is another rig.
+const LARGEST_RIG_ERRORS: [f64; RIG_ERRORS] = [5.0, 5.0, 5.0, 0.2, 0.2, 100.0, 100.0, 0.2];
 
 /// The sequences of the paper's sensitivity study.
 pub const PAPER_SEQUENCES: [&str; 3] = ["A", "B", "C"];
@@ -31,6 +35,24 @@ pub fn rate(text: &str) -> Result<f64, String> {
         Ok(_) => Err("must be a positive number".into()),
         Err(e) => Err(format!("{e}")),
     }
+}
+
+/// Errors of a rig: names and values, as `yaw_deg=0.02,pitch_deg=-0.01`.
+pub fn rig_errors(text: &str) -> Result<RigErrors, String> {
+    let mut vector = RigErrors::default().vector();
+    for word in text.split(',') {
+        let known = || RigErrors::NAMES.join(", ");
+        let (name, value) = word.split_once('=').ok_or("give NAME=VALUE, as yaw_deg=0.02")?;
+        let k = RigErrors::NAMES.iter().position(|known| *known == name.trim());
+        let k = k.ok_or_else(|| format!("{name:?} is not one of {}", known()))?;
+        let largest = LARGEST_RIG_ERRORS[k];
+        let value = number(value.trim()).map_err(|why| format!("{name}: {why}"))?;
+        if value.abs() > largest {
+            return Err(format!("{name} must lie within -{largest} and {largest}"));
+        }
+        vector[k] = value * RigErrors::UNITS[k];
+    }
+    Ok(RigErrors::from_vector(&vector))
 }
 
 /// Width and height of images that are rendered, as 640x480.

@@ -1,11 +1,12 @@
 //! The trajectory in all formats, and `motion.csv`: one row for each frame from the second on.
 
 use anyhow::Result;
-use egomotion::estimate::MotionEstimate;
-use egomotion::geometry::{RigCamera, StereoRig};
+use egomotion::estimate::{CovarianceParts, MotionEstimate};
+use egomotion::geometry::{Gaussian, RigCamera, StereoRig};
 use egomotion::pipeline::{Config, Observe};
 use egomotion_io::motion_table::{self, EstimatedMotion, MotionRow};
 use egomotion_io::trajectory::{Pose, write_euroc, write_kitti, write_tum};
+use egomotion_io::trajectory_covariance;
 
 use super::folder::ResultFolder;
 use super::moving;
@@ -58,6 +59,10 @@ fn write_trajectory(folder: &ResultFolder, outcome: &Outcome) -> Result<()> {
     write_tum(&folder.path().join("trajectory_tum.txt"), &poses)?;
     write_kitti(&folder.path().join("trajectory_kitti.txt"), &poses)?;
     write_euroc(&folder.path().join("trajectory_euroc.csv"), &poses)?;
+    let frames = outcome.frames.iter().map(|frame| frame.index);
+    let covariances = frames.zip(times).zip(outcome.trajectory.covariances_from(0));
+    let rows = covariances.map(|((frame, &time_s), cov)| (frame, time_s, cov));
+    trajectory_covariance::write(&folder.path().join("trajectory_covariance.csv"), rows)?;
     Ok(())
 }
 
@@ -82,17 +87,31 @@ pub fn motion_row(frame: &FrameResult, viewpoint: Viewpoint<'_>) -> MotionRow {
         frame: frame.index,
         time_s: motion.time_s,
         dt_s: motion.dt_s,
-        motion: motion.motion.as_ref().ok().map(|left| viewpoint.of(left)).map(|estimate| EstimatedMotion {
-            phi: estimate.theta,
-            observed: estimate.observed,
-            rows: estimate.rows,
-            inliers: estimate.inliers,
-        }),
+        motion: motion.motion.as_ref().ok().map(|left| estimated(left, motion.parts.as_ref(), viewpoint)),
         impact_s: impact.and_then(|impact| {
             let (low, high) = impact.interval95_s()?;
             Some([impact.seconds()?, low, high])
         }),
         status: status(frame).to_owned(),
+    }
+}
+
+/// φ of a row, from that of the left camera.
+fn estimated(
+    left: &MotionEstimate,
+    parts: Option<&CovarianceParts>,
+    viewpoint: Viewpoint<'_>,
+) -> EstimatedMotion {
+    let whole = viewpoint.of(left);
+    let own = |parts: &CovarianceParts| {
+        viewpoint.of(&MotionEstimate { theta: Gaussian { cov: parts.own, ..left.theta }, ..*left }).theta.cov
+    };
+    EstimatedMotion {
+        phi: whole.theta,
+        own: parts.map(own),
+        observed: whole.observed,
+        rows: whole.rows,
+        inliers: whole.inliers,
     }
 }
 

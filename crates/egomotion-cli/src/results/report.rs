@@ -50,6 +50,7 @@ pub fn write_report(
         complete: outcome.complete,
         frames: &frames,
         poses: outcome.trajectory.poses(),
+        pose_covariances: &outcome.trajectory.covariances_from(0).collect::<Vec<_>>(),
         truth: outcome.truth.as_deref(),
         album: &outcome.album,
         stages_ms: outcome.stages_ms.clone(),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use egomotion::geometry::{RigCamera, StereoRectification, StereoRig};
+use egomotion::geometry::{RIG_ERRORS, RigCamera, RigErrors, StereoRectification, StereoRig};
 use egomotion::pipeline::Config;
 use egomotion::pipeline::solve::Contradiction;
 use egomotion_io::source::{DepthSensor, Sequence};
@@ -59,6 +59,8 @@ pub struct Summary {
     /// Median over the frames of the vertical disparity of matches, in pixels: 0 if perfectly rectified.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row_disagreement_px: Option<f64>,
+    /// The errors of the rig that the uncertainty allows for.
+    pub rig_errors: Vec<RigErrorState>,
     /// Why the method cannot hold on this recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub biased: Option<String>,
@@ -71,6 +73,34 @@ pub struct Summary {
     /// Maps against the source's own truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth_maps: Option<MapVerdict>,
+}
+
+/// An error of the rig: what is known of it, in the unit of its name.
+#[derive(Debug, Clone, Serialize)]
+pub struct RigErrorState {
+    pub name: &'static str,
+    pub value: f64,
+    /// Standard deviation after the last frame.
+    pub sigma: f64,
+    /// Standard deviation that the configuration gives; `None` where the images' rows give it.
+    pub prior_sigma: Option<f64>,
+}
+
+impl RigErrorState {
+    /// As the last answer knows them; none without an answer.
+    fn all(config: &Config, outcome: &Outcome) -> Vec<Self> {
+        let Some(last) = outcome.frames.iter().rfind(|frame| frame.motion.motion.is_ok()) else {
+            return Vec::new();
+        };
+        let (value, sigma) = (config.rig_errors.values().vector(), last.motion.rig_sigma.vector());
+        let prior = config.rig_errors.stated();
+        let state = |k: usize| {
+            let unit = RigErrors::UNITS[k];
+            let (value, sigma) = (value[k] / unit, sigma[k] / unit);
+            Self { name: RigErrors::NAMES[k], value, sigma, prior_sigma: prior[k] }
+        };
+        (0..RIG_ERRORS).map(state).collect()
+    }
 }
 
 /// Raw cameras, and a depth sensor.
@@ -133,6 +163,7 @@ impl Summary {
             frame_ms: outcome.frame_ms,
             wall_s: outcome.wall_s,
             row_disagreement_px,
+            rig_errors: RigErrorState::all(config, outcome),
             warnings: biased.iter().cloned().chain(row_disagreement_px.and_then(badly_rectified)).collect(),
             biased,
             truth: MotionVerdict::of(outcome),

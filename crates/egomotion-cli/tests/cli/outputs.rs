@@ -160,6 +160,7 @@ fn without_maps_only_the_files_of_the_contract_appear() {
     let mut expected = vec![
         "motion.csv",
         "summary.json",
+        "trajectory_covariance.csv",
         "trajectory_euroc.csv",
         "trajectory_kitti.txt",
         "trajectory_tum.txt",

@@ -5,7 +5,7 @@ mod folder;
 
 use std::path::{Path, PathBuf};
 
-use egomotion::geometry::StereoRig;
+use egomotion::geometry::{RigErrors, StereoRig};
 use egomotion::sim::{Scene, SensorNoise, Sequence};
 use serde::{Deserialize, Serialize};
 
@@ -40,6 +40,8 @@ pub struct SimulationOptions {
     pub texture: Option<u64>,
     /// A file with a scene, and perhaps rig and sensor, in place of the sequence's own: a `scene.toml`.
     pub scene: Option<PathBuf>,
+    /// By how much the rig that takes the images differs from the one that the files state.
+    pub rig_errors: RigErrors,
 }
 
 impl SimulationOptions {
@@ -55,6 +57,7 @@ impl SimulationOptions {
             seed: None,
             texture: None,
             scene: None,
+            rig_errors: RigErrors::default(),
         }
     }
 }
@@ -107,6 +110,7 @@ impl Simulation {
         if let Some(seed) = options.texture {
             sequence = sequence.with_texture(seed);
         }
+        sequence = sequence.with_rig_errors(options.rig_errors);
         let sensor = match options.noise {
             Some(true) => SensorNoise::default(),
             // The files hold 8 bits.

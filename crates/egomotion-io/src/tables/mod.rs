@@ -5,3 +5,4 @@ pub mod motion_parquet;
 pub mod motion_table;
 pub mod tracks;
 pub mod trajectory;
+pub mod trajectory_covariance;

@@ -11,7 +11,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
 
-use crate::tables::motion_table::{EstimatedMotion, MotionRow, upper_triangle};
+use crate::tables::motion_table::{EstimatedMotion, MotionRow, covariance_columns, upper_triangle};
 use crate::{IoError, write};
 
 /// φ's components.
@@ -50,16 +50,17 @@ pub fn encode(rows: &[MotionRow]) -> Result<Vec<u8>> {
 /// The columns of `motion.csv`, in their order.
 fn schema() -> String {
     let double = |name: String| format!("optional double {name};");
-    let cov = upper_triangle().map(|(i, j)| double(format!("cov_{i}{j}")));
+    let covariance = |name: &str| covariance_columns(name).map(double).collect::<String>();
     let doubles = |names: &[&str]| names.iter().map(|name| double((*name).to_owned())).collect::<String>();
     format!(
         "message motion {{ required int64 frame; required double time_s; {} {} {} \
          optional int64 rows; optional int64 inliers; optional binary observed (string); {} \
-         required binary status (string); }}",
+         required binary status (string); {} }}",
         double("dt_s".into()),
         doubles(&PHI),
-        cov.collect::<String>(),
+        covariance("cov"),
         doubles(&IMPACT),
+        covariance("own"),
     )
 }
 
@@ -87,6 +88,9 @@ impl Columns<'_, '_> {
             self.optional::<DoubleType>(|row| row.impact_s.map(|seconds| seconds[k]))?;
         }
         self.required::<ByteArrayType>(|row| ByteArray::from(row.status.as_str()))?;
+        for (i, j) in upper_triangle() {
+            self.of_motion::<DoubleType>(|motion| Some(motion.own?[(i, j)]))?;
+        }
         self.group.close().map(|_| ())
     }
 
@@ -132,7 +136,7 @@ mod tests {
         cov[(2, 2)] = f64::INFINITY;
         let phi = Gaussian { mean: Vector6::new(0.1, -1.0 / 3.0, 0.0, 2e-3, -0.0, -5.5), cov };
         let observed = [true, true, false, true, true, true];
-        let motion = Some(EstimatedMotion { phi, observed, rows: 900, inliers: 800 });
+        let motion = Some(EstimatedMotion { phi, own: Some(cov * 0.25), observed, rows: 900, inliers: 800 });
         let row = |frame, motion, impact_s, status: &str| MotionRow {
             frame,
             time_s: 1e9 + 0.1 * frame as f64,

@@ -30,6 +30,8 @@ pub struct EstimatedMotion {
     /// φ = (tX, tY, tZ, ΩX, ΩY, ΩZ), scene motion of the left camera or of that which the run's summary names, in metres and radians; a component that is not
     /// observed is 0 with an infinite variance.
     pub phi: Gaussian<6>,
+    /// What of the covariance is new in this pair of frames, and not shared with others; `None` in tables that do not say.
+    pub own: Option<Matrix6<f64>>,
     /// Which components are determined.
     pub observed: [bool; 6],
     /// Number of rows that went into the estimate.
@@ -55,7 +57,7 @@ const COLUMNS_BEFORE_COVARIANCE: [&str; 9] = ["frame", "time_s", "dt_s", "tx", "
 /// Columns after those of the covariance; times to impact are in seconds.
 const COLUMNS_AFTER_COVARIANCE: [&str; 7] =
     ["rows", "inliers", "observed", "impact_s", "impact_lo_s", "impact_hi_s", "status"];
-/// Number of all columns; the covariance has 21, its upper triangle.
+/// Number of the columns up to the status; a covariance has 21, its upper triangle. Those of `own` may follow.
 const COLUMN_COUNT: usize = COLUMNS_BEFORE_COVARIANCE.len() + 21 + COLUMNS_AFTER_COVARIANCE.len();
 /// What to do about a table that cannot be read.
 const ADVICE_ON_FORMAT: &str = "give a motion.csv as `egomotion run` writes it";
@@ -65,13 +67,18 @@ pub(crate) fn upper_triangle() -> impl Iterator<Item = (usize, usize)> {
     (0..6).flat_map(|i| (i..6).map(move |j| (i, j)))
 }
 
+/// The names of a covariance's columns.
+pub(crate) fn covariance_columns(name: &str) -> impl Iterator<Item = String> {
+    upper_triangle().map(move |(i, j)| format!("{name}_{i}{j}"))
+}
+
 fn head() -> Vec<String> {
-    let cov = upper_triangle().map(|(i, j)| format!("cov_{i}{j}"));
     COLUMNS_BEFORE_COVARIANCE
         .map(String::from)
         .into_iter()
-        .chain(cov)
+        .chain(covariance_columns("cov"))
         .chain(COLUMNS_AFTER_COVARIANCE.map(String::from))
+        .chain(covariance_columns("own"))
         .collect()
 }
 
@@ -112,6 +119,10 @@ fn record(row: &MotionRow) -> Vec<String> {
         None => record.extend(std::iter::repeat_n(String::new(), 3)),
     }
     record.push(row.status.clone());
+    match row.motion.as_ref().and_then(|motion| motion.own) {
+        Some(own) => record.extend(upper_triangle().map(|(i, j)| number(own[(i, j)]))),
+        None => record.extend(std::iter::repeat_n(String::new(), 21)),
+    }
     record
 }
 
@@ -131,7 +142,8 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<MotionRow>, IoError> {
     let mut lines = text.lines().enumerate().map(|(n, line)| (n + 1, line.trim_end_matches('\r')));
     let refuse = |line: usize, reason: String| IoError::new(path, reason, ADVICE_ON_FORMAT).at_line(line);
     match lines.next() {
-        Some((_, first)) if first == head().join(",") => {}
+        Some((_, first))
+            if [head().join(","), head()[..COLUMN_COUNT].join(",")].contains(&first.to_owned()) => {}
         _ => return Err(refuse(1, "has not the columns of a motion table".into())),
     }
     let rows = lines.filter(|(_, line)| !line.trim().is_empty());
@@ -140,8 +152,8 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<MotionRow>, IoError> {
 
 fn row(line: &str) -> Result<MotionRow, String> {
     let fields = Fields(line.split(',').collect());
-    if fields.0.len() != COLUMN_COUNT {
-        return Err(format!("the row has {} fields, not {COLUMN_COUNT}", fields.0.len()));
+    if ![COLUMN_COUNT, COLUMN_COUNT + 21].contains(&fields.0.len()) {
+        return Err(format!("the row has {} fields, not {}", fields.0.len(), COLUMN_COUNT + 21));
     }
     let last = COLUMN_COUNT - COLUMNS_AFTER_COVARIANCE.len();
     let impact = [3, 4, 5].map(|k| fields.number(last + k));
@@ -188,12 +200,20 @@ impl Fields<'_> {
         for i in 0..6 {
             phi.mean[i] = self.number(3 + i)?.unwrap_or(0.0);
         }
+        phi.cov = self.covariance(COLUMNS_BEFORE_COVARIANCE.len())?;
+        let said = self.0.get(COLUMN_COUNT).is_some_and(|field| !field.is_empty());
+        let own = said.then(|| self.covariance(COLUMN_COUNT)).transpose()?;
+        Ok(EstimatedMotion { phi, own, observed, rows: self.count(last)?, inliers: self.count(last + 1)? })
+    }
+
+    /// The covariance whose upper triangle begins at a field.
+    fn covariance(&self, first: usize) -> Result<Matrix6<f64>, String> {
+        let mut cov = Matrix6::zeros();
         for (k, (i, j)) in upper_triangle().enumerate() {
-            let value =
-                self.number(COLUMNS_BEFORE_COVARIANCE.len() + k)?.ok_or("the covariance is not complete")?;
-            (phi.cov[(i, j)], phi.cov[(j, i)]) = (value, value);
+            let value = self.number(first + k)?.ok_or("the covariance is not complete")?;
+            (cov[(i, j)], cov[(j, i)]) = (value, value);
         }
-        Ok(EstimatedMotion { phi, observed, rows: self.count(last)?, inliers: self.count(last + 1)? })
+        Ok(cov)
     }
 }
 
@@ -207,7 +227,10 @@ mod tests {
         let mut partial = phi;
         partial.mean[2] = 0.0;
         partial.cov[(2, 2)] = f64::INFINITY;
-        let motion = |phi, observed| Some(EstimatedMotion { phi, observed, rows: 900, inliers: 800 });
+        let motion = |phi, observed| {
+            let own = Some(cov * 0.25);
+            Some(EstimatedMotion { phi, own, observed, rows: 900, inliers: 800 })
+        };
         let row = |frame, motion, impact_s, status: &str| MotionRow {
             frame,
             time_s: 0.1 * frame as f64,
@@ -228,7 +251,19 @@ mod tests {
         let text = text(&rows());
         assert_eq!(parse(&text, Path::new("motion.csv")).unwrap(), rows());
         assert!(text.starts_with("frame,time_s,dt_s,tx,ty,tz,wx,wy,wz,cov_00,cov_01,"));
-        assert!(text.contains(",cov_55,rows,inliers,observed,impact_s,impact_lo_s,impact_hi_s,status\n"));
+        assert!(
+            text.contains(",cov_55,rows,inliers,observed,impact_s,impact_lo_s,impact_hi_s,status,own_00,")
+        );
+        assert!(text.lines().next().is_some_and(|head| head.ends_with(",own_55")));
+    }
+
+    #[test]
+    fn a_table_without_what_is_new_in_each_pair_is_read() {
+        let short = |line: &str| line.split(',').take(COLUMN_COUNT).collect::<Vec<_>>().join(",") + "\n";
+        let old: String = text(&rows()).lines().map(short).collect();
+        let mut expected = rows();
+        expected.iter_mut().filter_map(|row| row.motion.as_mut()).for_each(|motion| motion.own = None);
+        assert_eq!(parse(&old, Path::new("motion.csv")).unwrap(), expected);
     }
 
     #[test]
@@ -237,7 +272,7 @@ mod tests {
         let refused = |text: &str| parse(text, Path::new("m.csv")).unwrap_err().to_string();
         assert!(refused("").contains("m.csv:1: has not the columns"));
         assert!(refused(&whole.replace("cov_00", "cov")).contains("m.csv:1: has not the columns"));
-        assert!(refused(&whole.replace(",bad_image", "")).contains("m.csv:2: the row has 36 fields, not 37"));
+        assert!(refused(&whole.replace(",bad_image", "")).contains("m.csv:2: the row has 57 fields, not 58"));
         assert!(refused(&whole.replace("111111", "11211")).contains("m.csv:3: \"11211\" does not say"));
         assert!(refused(&whole.replace("-5.5", "x")).contains("m.csv:3: \"x\" is not a number"));
         assert!(

@@ -198,7 +198,7 @@ fn encoded(format: image_crate::ImageFormat) -> Vec<u8> {
 
 fn motion_row() -> MotionRow {
     let phi = Gaussian { mean: Vector6::new(0.1, 0.2, -1.0, 1e-3, 2e-3, 0.0), cov: Matrix6::identity() };
-    let motion = EstimatedMotion { phi, observed: [true; 6], rows: 900, inliers: 800 };
+    let motion = EstimatedMotion { phi, own: Some(phi.cov), observed: [true; 6], rows: 900, inliers: 800 };
     MotionRow {
         frame: 7,
         time_s: 0.7,

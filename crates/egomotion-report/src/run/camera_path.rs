@@ -2,10 +2,9 @@
 
 use egomotion::geometry::RigidMotion;
 use maud::{Markup, html};
-use nalgebra::{Matrix2, Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix6, Vector3};
 
 use super::interval::Interval;
-use super::position_covariance;
 use super::report::Report;
 use super::time_series::TimeSeries;
 use super::timeline::Timeline;
@@ -37,7 +36,7 @@ impl<'a> CameraPath<'a> {
         Self {
             poses: report.poses,
             truth: report.truth.map(|truth| aligned(truth, report.poses)).unwrap_or_default(),
-            covariances: position_covariance::covariances(report),
+            covariances: report.poses.iter().zip(report.pose_covariances).map(position_covariance).collect(),
         }
     }
 
@@ -184,6 +183,13 @@ fn spaced(len: usize, n: usize) -> impl Iterator<Item = usize> {
     (0..len).rev().step_by(step)
 }
 
+/// Covariance of a position in the world, in m²; `None` where it is not known.
+fn position_covariance((pose, cov): (&RigidMotion, &Matrix6<f64>)) -> Option<Matrix3<f64>> {
+    let of_translation = cov.fixed_view::<3, 3>(0, 0);
+    let known = of_translation.iter().all(|v| v.is_finite());
+    known.then(|| pose.rotation * of_translation * pose.rotation.transpose())
+}
+
 /// A 95 % ellipse, in SVG units and degrees.
 struct Ellipse {
     centre: (f64, f64),
@@ -227,8 +233,28 @@ mod tests {
     use egomotion::geometry::Twist;
     use nalgebra::Vector6;
 
-    use super::super::position_covariance::tests::poses;
     use super::*;
+
+    /// Poses from motions, as the trajectory is built.
+    fn poses(phis: &[Vector6<f64>]) -> Vec<RigidMotion> {
+        let mut all = vec![RigidMotion::identity()];
+        for phi in phis {
+            let last = all[all.len() - 1];
+            all.push(last.after(&Twist::from_vector(phi).exp().inverse()));
+        }
+        all
+    }
+
+    #[test]
+    fn what_is_uncertain_ahead_is_so_where_the_camera_looks() {
+        let right =
+            Twist { omega: Vector3::new(0.0, std::f64::consts::FRAC_PI_2, 0.0), t: Vector3::zeros() }.exp();
+        let cov = Matrix6::from_diagonal(&Vector6::new(1.0, 2.0, 9.0, 0.0, 0.0, 0.0));
+        let seen = position_covariance((&right, &cov)).unwrap();
+        assert!((seen - Matrix3::from_diagonal(&Vector3::new(9.0, 2.0, 1.0))).amax() < 1e-12, "{seen}");
+        let unknown = Matrix6::from_diagonal_element(f64::INFINITY);
+        assert_eq!(position_covariance((&right, &unknown)), None);
+    }
 
     #[test]
     fn truth_starts_where_the_estimate_does() {

@@ -15,7 +15,6 @@ mod outlines;
 mod page;
 mod pictures;
 mod player;
-mod position_covariance;
 mod report;
 mod scene_motion;
 mod scene_set;

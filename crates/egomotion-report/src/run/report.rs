@@ -4,6 +4,7 @@ use egomotion::estimate::MotionEstimate;
 use egomotion::geometry::{RigidMotion, StereoRig, Twist};
 use egomotion::motion::{NoObstacle, Obstacle};
 use egomotion::pipeline::MovingGroup;
+use nalgebra::Matrix6;
 
 use super::album::Album;
 use super::interval::Interval;
@@ -34,6 +35,9 @@ pub struct Report<'a> {
     pub frames: &'a [FrameRow],
     /// world_from_camera, one a row.
     pub poses: &'a [RigidMotion],
+    /// Covariance of δ in T = T̂ exp(δ) of each pose, (translation, rotation) in metres and radians, 6×6; infinite where
+    /// nothing is known of it.
+    pub pose_covariances: &'a [Matrix6<f64>],
     /// True poses, one a row; brought to the first estimated pose before they are drawn.
     pub truth: Option<&'a [RigidMotion]>,
     /// Pictures of some frames, in order.

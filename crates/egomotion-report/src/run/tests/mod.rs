@@ -16,6 +16,7 @@ pub struct Run {
     pub rig: StereoRig,
     pub rows: Vec<FrameRow>,
     pub poses: Vec<RigidMotion>,
+    pub pose_covariances: Vec<Matrix6<f64>>,
     pub truth: Option<Vec<RigidMotion>>,
 }
 
@@ -64,6 +65,7 @@ impl Run {
         Self {
             rig: StereoRig::new(500.0, (31.5, 23.5), 0.1, (64, 48)).unwrap(),
             rows: phis.iter().enumerate().map(|(k, phi)| row(k, *phi)).collect(),
+            pose_covariances: (0..phis.len()).map(|k| Matrix6::identity() * 1e-6 * k as f64).collect(),
             truth: Some(poses.clone()),
             poses,
         }
@@ -81,6 +83,7 @@ impl Run {
             complete: true,
             frames: &self.rows,
             poses: &self.poses,
+            pose_covariances: &self.pose_covariances,
             truth: self.truth.as_deref(),
             album,
             stages_ms: vec![("disparity", 12.0), ("flow", 30.0)],
