@@ -79,15 +79,17 @@ def one_worker_killed(cluster: Cluster, out: Path, after: int = 0) -> Iterator[K
 
     def kill() -> None:
         end = time.monotonic() + 60
+        hit: set[str] = set()
         while not killed.task and time.monotonic() < end:
             time.sleep(0.005)
             if len(times(out)) >= after:
                 for worker, task in cluster.busy().items():
                     if PART.fullmatch(task) and not killed.task:
                         os.kill(worker, signal.SIGKILL)
-                        finished = times(out)
-                        # It may have been about to end.
-                        if task not in finished:
+                        hit.add(task)
+                        # It may have left its part and not said so: then it is done again, and another one is killed.
+                        finished = {name: moment for name, moment in times(out).items() if name not in hit}
+                        if task not in times(out):
                             killed.task, killed.finished = task, finished
 
     thread = threading.Thread(target=kill, daemon=True)
