@@ -19,8 +19,8 @@ def size_of(source):
     return Image.open(os.path.join(folder, sorted(os.listdir(folder))[0])).size
 
 
-def run(source, out, mask, config, options):
-    command = [PROGRAM, "run", source, "--out", out, "--mask", mask, "--config", config, "--quiet", *options]
+def run(source, out, mask, options):
+    command = [PROGRAM, "run", source, "--out", out, "--mask", mask, "--quiet", *options]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     motions = {}
     for row in csv.DictReader(open(os.path.join(out, "motion.csv"))):
@@ -29,7 +29,7 @@ def run(source, out, mask, config, options):
         cov = np.zeros((6, 6))
         for i in range(6):
             for j in range(i, 6):
-                cov[i, j] = cov[j, i] = float(row[f"cov_{i}{j}"])
+                cov[i, j] = cov[j, i] = float(row[f"own_{i}{j}"])  # what both halves share is not in their difference
         motions[int(row["frame"])] = np.array([float(row[c]) for c in COLUMNS]), cov
     return motions
 
@@ -43,14 +43,11 @@ def main():
     width, height = size_of(source)
     board = np.add.outer(np.arange(height) // cell, np.arange(width) // cell) % 2
     with tempfile.TemporaryDirectory() as folder:
-        config = os.path.join(folder, "config.toml")
-        # What both halves share is not in their difference.
-        open(config, "w").write("[maximum_likelihood]\nphase_error_px = 0.0\n")
         halves = []
         for half in range(2):
             mask = os.path.join(folder, f"mask{half}.png")
             Image.fromarray(((board == half) * 255).astype(np.uint8)).save(mask)
-            halves.append(run(source, os.path.join(folder, f"half{half}"), mask, config, options))
+            halves.append(run(source, os.path.join(folder, f"half{half}"), mask, options))
     a, b = halves
     nees, squares = [], []
     for frame in sorted(a.keys() & b.keys()):
