@@ -278,6 +278,6 @@ mod tests {
         assert!(
             refused(&whole.replace(",900,", ",-900,")).contains("m.csv:3: \"-900\" is not a whole number")
         );
-        assert!(refused(&whole.replace("1.2", "NaN")).contains("m.csv:3: \"NaN\" is not a number"));
+        assert!(refused(&whole.replace(",1.2,", ",NaN,")).contains("m.csv:3: \"NaN\" is not a number"));
     }
 }
