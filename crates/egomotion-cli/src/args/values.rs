@@ -41,10 +41,9 @@ pub fn rate(text: &str) -> Result<f64, String> {
 pub fn rig_errors(text: &str) -> Result<RigErrors, String> {
     let mut vector = RigErrors::default().vector();
     for word in text.split(',') {
-        let known = || RigErrors::NAMES.join(", ");
         let (name, value) = word.split_once('=').ok_or("give NAME=VALUE, as yaw_deg=0.02")?;
         let k = RigErrors::NAMES.iter().position(|known| *known == name.trim());
-        let k = k.ok_or_else(|| format!("{name:?} is not one of {}", known()))?;
+        let k = k.ok_or_else(|| format!("{name:?} is not one of {}", RigErrors::NAMES.join(", ")))?;
         let largest = LARGEST_RIG_ERRORS[k];
         let value = number(value.trim()).map_err(|why| format!("{name}: {why}"))?;
         if value.abs() > largest {

@@ -84,8 +84,6 @@ pub struct PoseRecord {
     pub poses: Vec<ComparedPose>,
     /// Pairs of poses without a finite covariance.
     pub unknown: usize,
-    /// The rig's errors over their standard deviations, where they may differ from zero.
-    pub rig: Vec<f64>,
 }
 
 impl PoseConsistency {

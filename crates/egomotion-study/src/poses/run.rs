@@ -31,8 +31,6 @@ impl PoseConsistency {
         let errors = RigErrors::from_vector(&drawn.component_mul(&sigma.vector()));
         let sequence = sequence.clone().with_texture(rng.random()).with_rig_errors(errors);
         let trajectory = self.trajectory(&sequence, seed >> 1)?;
-        let rig: Vec<f64> =
-            drawn.iter().zip(sigma.vector().iter()).filter(|(_, s)| **s > 0.0).map(|(z, _)| *z).collect();
         Ok(FRAMES_APART
             .map(|apart| {
                 let mut record = PoseRecord {
@@ -41,7 +39,6 @@ impl PoseConsistency {
                     frames_apart: apart,
                     poses: Vec::new(),
                     unknown: 0,
-                    rig: rig.clone(),
                 };
                 record.compare(&trajectory, &sequence);
                 record

@@ -67,7 +67,7 @@ fn row(label: &str, apart: usize, records: &[&PoseRecord]) -> Vec<Cell> {
     ]
 }
 
-/// Normalised variance of each component over each number of frames, and of the rig's errors.
+/// Normalised variance of each component over each number of frames.
 pub(super) fn components(records: &[PoseRecord]) -> Table {
     let columns = [
         ("frames_apart", "frames apart"),
@@ -77,10 +77,8 @@ pub(super) fn components(records: &[PoseRecord]) -> Table {
         ("rot_x", "about X"),
         ("rot_y", "about Y"),
         ("rot_z", "about Z"),
-        ("rig", "rig's errors"),
     ];
-    let caption = "Mean squared error over the stated variance: of each component of the relative poses, and of the rig's \
-                   errors.";
+    let caption = "Mean squared error over the stated variance, of each component of the relative poses.";
     let mut table = Table::new("normalised-variance", "Normalised variance of poses", caption, &columns);
     for apart in FRAMES_APART {
         let chosen: Vec<&PoseRecord> = records.iter().filter(|r| r.frames_apart == apart).collect();
@@ -88,10 +86,8 @@ pub(super) fn components(records: &[PoseRecord]) -> Table {
         let of = |c: usize| {
             poses.iter().map(|pose| (pose.0[c].0 / pose.0[c].1).powi(2)).sum::<f64>() / poses.len() as f64
         };
-        let rig: Vec<f64> = chosen.iter().flat_map(|r| &r.rig).map(|z| z * z).collect();
         let mut cells: Vec<Cell> = vec![apart.into()];
         cells.extend((0..6).map(|c| Cell::from(of(c))));
-        cells.push((rig.iter().sum::<f64>() / rig.len() as f64).into());
         table.rows.push(cells);
     }
     table
