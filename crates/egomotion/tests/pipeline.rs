@@ -252,7 +252,7 @@ fn a_still_camera_is_still_by_dense_observations() {
 
 // ---- trajectory ----
 
-fn answer(
+pub fn answer(
     frame: usize,
     time_s: f64,
     reference: Option<(usize, f64)>,

@@ -40,3 +40,30 @@ fn bounded(cross: &Matrix6<f64>, [first, second]: [&Matrix6<f64>; 2]) -> Option<
     let bounded = svd.singular_values.map(|r| r.min(LARGEST_CORRELATION));
     Some(a * u * Matrix6::from_diagonal(&bounded) * vt * b.transpose())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn opposite_influences_of_a_common_frame_are_a_negative_covariance() {
+        // Six blocks, each of which moves one component by 0.3 and the other way in the next pair.
+        let first = BlockInfluences((0..6).map(|i| Vector6::ith(i, 0.3)).collect());
+        let second = BlockInfluences((0..6).map(|i| Vector6::ith(i, -0.3)).collect());
+        let cov = Matrix6::identity();
+        let found = shared_covariance(&first, &second, [&cov, &cov]);
+        assert!((found + Matrix6::identity() * 0.09).amax() < 1e-12, "{found}");
+    }
+
+    #[test]
+    fn no_correlation_exceeds_a_half_and_what_is_unknown_shares_nothing() {
+        let blocks = BlockInfluences((0..6).map(|i| Vector6::ith(i, 0.9)).collect());
+        let cov = Matrix6::identity();
+        let found = shared_covariance(&blocks, &blocks, [&cov, &cov]);
+        assert!((found - Matrix6::identity() * 0.5).amax() < 1e-12, "{found}");
+        let unknown = Matrix6::from_diagonal_element(f64::INFINITY);
+        assert_eq!(shared_covariance(&blocks, &blocks, [&cov, &unknown]), Matrix6::zeros());
+        let other_frame = BlockInfluences(Vec::new());
+        assert_eq!(shared_covariance(&blocks, &other_frame, [&cov, &cov]), Matrix6::zeros());
+    }
+}

@@ -333,7 +333,7 @@ fn influences<M: LikelihoodTerm>(
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{SVector, Vector3};
+    use nalgebra::{Matrix6, SVector, Vector3};
 
     use super::*;
     use crate::constrain::phase_wave;
@@ -383,6 +383,31 @@ mod tests {
             let errors = RigErrors::from_vector(&SVector::ith(k, 1e-5));
             let error = solve(Vector3::zeros(), errors) / 1e-5 - expected.column(k);
             assert!(error.amax() < 5e-3 * expected.column(k).amax(), "{k} {error} {}", expected.column(k));
+        }
+    }
+
+    #[test]
+    fn the_field_s_response_is_that_of_each_block_moved_by_itself() {
+        let rig = StereoRig::new(400.0, (159.5, 119.5), 0.15, (320, 240)).unwrap();
+        let phi = Twist { t: Vector3::new(0.02, -0.01, -0.2), omega: Vector3::new(0.004, -0.006, 0.002) };
+        let kernel = StudentT { nu: f64::INFINITY, iterations: 50, tolerance: 1e-10, ..StudentT::default() };
+        let blocks = Blocks::tiling(&rig, 80.0);
+        let exact = tracks(&rig, &phi, Vector3::zeros(), RigErrors::default());
+        let solve =
+            |tracks: &[StereoTrack]| maximum_likelihood(tracks, &rig, &phi, Some(&blocks), &kernel).unwrap();
+        let mut sum = Matrix6::zeros();
+        for (block, axis) in (0..blocks.count()).flat_map(|block| (0..3).map(move |axis| (block, axis))) {
+            let mut moved = exact.clone();
+            let inside =
+                |track: &&mut StereoTrack| blocks.index(track.before.mean.x, track.before.mean.y) == block;
+            moved.iter_mut().filter(inside).for_each(|track| track.after.mean[axis] += 1e-4);
+            let change = (solve(&moved).motion.theta.mean - phi.vector()) / 1e-4;
+            sum += change * change.transpose();
+        }
+        let factor = solve(&exact).systematic.unwrap().phi_per_field_px;
+        let found = factor * factor.transpose();
+        for i in 0..6 {
+            assert!((found[(i, i)] / sum[(i, i)] - 1.0).abs() < 0.01, "{i} {found} {sum}");
         }
     }
 }
