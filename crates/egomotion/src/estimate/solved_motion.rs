@@ -1,4 +1,4 @@
-//! A motion, and of what its covariance is made: what is new in its pair of frames, and what other pairs share with it.
+//! A motion and the parts of its covariance: what is new in its pair of frames, and what other pairs share with it.
 
 use nalgebra::{Matrix6, SMatrix};
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ impl CovarianceParts {
     }
 }
 
-/// A motion with what tells the parts of its covariance.
+/// A motion, from which the parts of its covariance follow.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SolvedMotion {
     /// φ̂; its covariance is what is new in the pair.
@@ -68,7 +68,7 @@ impl SolvedMotion {
     /// φ̂ with the covariance of the pair's noise and of matching, that of an exact rig.
     pub fn with_exact_rig(&self) -> MotionEstimate {
         let mut motion = self.motion;
-        motion.theta.cov += self.phi_per_matching_sigma * self.phi_per_matching_sigma.transpose();
+        motion.theta.cov = self.parts(None).of_images();
         motion
     }
 

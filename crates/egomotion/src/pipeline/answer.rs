@@ -35,7 +35,7 @@ pub struct FrameMotion {
     pub dt_s: Option<f64>,
     /// φ over that interval with all of its uncertainty, or why there is none.
     pub motion: Result<MotionEstimate, Unanswered>,
-    /// Of what the covariance of φ is made; `None` without φ.
+    /// The parts of the covariance of φ; `None` without φ.
     pub parts: Option<CovarianceParts>,
     /// Standard deviations of the rig's errors that the covariance allows for.
     pub rig_sigma: RigErrors,

@@ -167,7 +167,9 @@ pub(super) fn correct(shift: &mut Field, errors: &RigErrors, rig: &StereoRig) {
         for (u, value) in shift.row_mut(v).iter_mut().enumerate() {
             let (x, y) = rig.image_from_pixel(u as f64, v as f64);
             let xyd = Vector3::new(x, y, rig.disparity_from_shift(f64::from(*value)));
-            *value -= errors.disparity_excess_px(&xyd, rig) as f32;
+            let excess = errors.disparity_excess_px(&xyd, rig);
+            // A point beyond the horizon is none.
+            *value = if xyd.z > excess { *value - excess as f32 } else { f32::NAN };
         }
     }
 }

@@ -43,7 +43,7 @@ struct Step {
     /// How long it took, in seconds.
     dt_s: f64,
     phi: Twist,
-    /// Of what its covariance is made; `None` where a component is not known.
+    /// The parts of its covariance; `None` where a component is not known.
     parts: Option<CovarianceParts>,
 }
 

@@ -36,12 +36,12 @@ pub struct RigPrior {
     /// Standard deviation of what is left of it, in degrees; without it, what the rows of the images allow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roll_sigma_deg: Option<f64>,
-    /// Known excess of the right focal length over the left one, in a share of it: it is taken away.
+    /// Known excess of the right focal length over the left one, as a share of it: it is taken away.
     pub focal_ratio: f64,
-    /// Standard deviation of what is left of it, in a share of it; without it, what the rows of the images allow.
+    /// Standard deviation of what is left of it, as a share of it; without it, what the rows of the images allow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_ratio_sigma: Option<f64>,
-    /// Standard deviation of the focal length of both cameras, in a share of it; without it, what the rows of the images allow.
+    /// Standard deviation of the focal length of both cameras, as a share of it; without it, what the rows of the images allow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focal_sigma: Option<f64>,
     /// Standard deviation of the principal point of both cameras along x, in pixels; without it, what the rows of the images
@@ -52,13 +52,13 @@ pub struct RigPrior {
     /// allow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre_y_sigma_px: Option<f64>,
-    /// Standard deviation of the baseline, in a share of it; without it, what the rows of the images allow.
+    /// Standard deviation of the baseline, as a share of it; without it, what the rows of the images allow.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub baseline_sigma: Option<f64>,
 }
 
 impl RigPrior {
-    /// The values; those that belong into the calibration are 0.
+    /// The values; those of the calibration itself are 0.
     pub fn values(&self) -> RigErrors {
         from_units([self.yaw_deg, self.pitch_deg, self.roll_deg, self.focal_ratio, 0.0, 0.0, 0.0, 0.0])
     }

@@ -73,6 +73,8 @@ impl FramePair<'_> {
         let known = config.rig_errors.values();
         if plan.source == TrackSource::Stereo && !known.is_none() {
             tracks.iter_mut().for_each(|track| track.correct(&known, rig));
+            // A point beyond the horizon is none.
+            tracks.retain(|track| track.before.mean.z > 0.0 && track.after.mean.z > 0.0);
         }
         tracks
     }
