@@ -137,3 +137,84 @@ pub fn systematic_response<M: Measurement>(
     let residuals = ResidualModel::of(kernel, &mut squares(observations, &at))?;
     SystematicResponse::of(observations, &at, &residuals, None)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{SVector, Vector3};
+
+    use super::*;
+    use crate::constrain::phase_wave;
+    use crate::estimate::likelihood::maximum_likelihood::maximum_likelihood;
+    use crate::geometry::{Gaussian, RigErrors};
+    use crate::observe::StereoTrack;
+
+    fn tracks(rig: &StereoRig, phi: &Twist, amplitude: Vector3<f64>, errors: RigErrors) -> Vec<StereoTrack> {
+        let variances = [0.01, 0.01, 0.02];
+        let place = |i: usize| {
+            let (a, b, c) = ((i * 37 % 200) as f64, (i * 53 % 150) as f64, (i * 17 % 31) as f64);
+            Vector3::new(a - 100.0, b - 75.0, 8.0 + c)
+        };
+        let moved = |xyd: &Vector3<f64>| rig.project(&phi.exp().apply(&rig.point(xyd).unwrap())).unwrap();
+        let wrong = |xyd: Vector3<f64>| xyd + RigErrors::jacobian(&xyd, rig) * errors.vector();
+        let seen = |i: usize| {
+            let (before, after) = (place(i), moved(&place(i)));
+            let moved = (after - before).xy().map(phase_wave);
+            let phase = Vector3::new(moved.x, moved.y, phase_wave(after.z)).component_mul(&amplitude);
+            (wrong(before) + Vector3::z() * amplitude.z * phase_wave(before.z), wrong(after) + phase)
+        };
+        let track = |(before, after): (Vector3<f64>, Vector3<f64>)| StereoTrack {
+            before: Gaussian::independent(before.into(), [0.0, 0.0, 0.02]),
+            after: Gaussian::independent(after.into(), variances),
+        };
+        (0..120).map(|i| track(seen(i))).collect()
+    }
+
+    #[test]
+    fn the_response_is_what_the_estimator_does() {
+        let rig = StereoRig::new(400.0, (159.5, 119.5), 0.15, (320, 240)).unwrap();
+        let phi = Twist { t: Vector3::new(0.02, -0.01, -0.2), omega: Vector3::new(0.004, -0.006, 0.002) };
+        let kernel = StudentT { nu: f64::INFINITY, iterations: 50, tolerance: 1e-10, ..StudentT::default() };
+        let solve = |amplitude, errors| {
+            let tracks = tracks(&rig, &phi, amplitude, errors);
+            maximum_likelihood(&tracks, &rig, &phi, None, &kernel).unwrap().motion.theta.mean - phi.vector()
+        };
+        let exact = tracks(&rig, &phi, Vector3::zeros(), RigErrors::default());
+        let found = systematic_response(&exact, &rig, &phi, &kernel).unwrap();
+        for k in 0..3 {
+            let error =
+                solve(Vector3::ith(k, 1e-3), RigErrors::default()) / 1e-3 - found.phi_per_phase_px.column(k);
+            assert!(error.amax() < 2e-3 * found.phi_per_phase_px.column(k).amax(), "{k} {error}");
+        }
+        let expected = found.phi_per_rig_error;
+        for k in 0..RIG_ERRORS {
+            let errors = RigErrors::from_vector(&SVector::ith(k, 1e-5));
+            let error = solve(Vector3::zeros(), errors) / 1e-5 - expected.column(k);
+            assert!(error.amax() < 5e-3 * expected.column(k).amax(), "{k} {error} {}", expected.column(k));
+        }
+    }
+
+    #[test]
+    fn the_field_s_response_is_that_of_each_block_moved_by_itself() {
+        let rig = StereoRig::new(400.0, (159.5, 119.5), 0.15, (320, 240)).unwrap();
+        let phi = Twist { t: Vector3::new(0.02, -0.01, -0.2), omega: Vector3::new(0.004, -0.006, 0.002) };
+        let kernel = StudentT { nu: f64::INFINITY, iterations: 50, tolerance: 1e-10, ..StudentT::default() };
+        let blocks = Blocks::tiling(&rig, 80.0);
+        let exact = tracks(&rig, &phi, Vector3::zeros(), RigErrors::default());
+        let solve =
+            |tracks: &[StereoTrack]| maximum_likelihood(tracks, &rig, &phi, Some(&blocks), &kernel).unwrap();
+        let mut sum = Matrix6::zeros();
+        for (block, axis) in (0..blocks.count()).flat_map(|block| (0..3).map(move |axis| (block, axis))) {
+            let mut moved = exact.clone();
+            let inside =
+                |track: &&mut StereoTrack| blocks.index(track.before.mean.x, track.before.mean.y) == block;
+            moved.iter_mut().filter(inside).for_each(|track| track.after.mean[axis] += 1e-4);
+            let change = (solve(&moved).motion.theta.mean - phi.vector()) / 1e-4;
+            sum += change * change.transpose();
+        }
+        let factor = solve(&exact).systematic.unwrap().phi_per_field_px;
+        let found = factor * factor.transpose();
+        for i in 0..6 {
+            assert!((found[(i, i)] / sum[(i, i)] - 1.0).abs() < 0.01, "{i} {found} {sum}");
+        }
+    }
+}
